@@ -445,7 +445,7 @@ def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened,
 
 def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_letters, monkeypatch):
     page = opened(served_letters)
-    shown = page.locator("#live-source-text pre").all_text_contents()
+    shown = page.locator("#live-source pre").all_text_contents()
     documented = re.findall(r"```(?:py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL)
     host = served_letters.address.removeprefix("http://")
     assert shown == [text.strip().replace("127.0.0.1:8420", host) for text in documented]
@@ -701,7 +701,7 @@ def test_movements_in_space_turn(opened, studio, tmp_path):
     running = studio(tmp_path / "space")
     page = opened(running)
     assert page.inner_text("#draw-empty-title") == "Movements in space"
-    assert "additional_headers" in page.inner_text("#live-source-text")
+    assert "additional_headers" in page.inner_text("#live-source")
     with Hand(running, "hand <b>tracker</b>") as hand:
         hand.send(t, 1.05 * shapes[0])
         wait_for_text(page, "#sources .source-name", "Live source connected: hand <b>tracker</b>")

@@ -138,7 +138,7 @@ class Wand:
         self._connections = state.connections
         host = f"[{self.host}]" if ":" in self.host else self.host
         address = f"https://{host}:{listening.getsockname()[1]}/?token={self.token}"
-        picture = segno.make(address, error="m").svg_data_uri(border=4, dark="#000", light="#fff")
+        picture = segno.make(address, error="m").svg_data_uri(border=4, dark="#000", light="#fff", omitsize=True)
         self.shown = WandOut(address=address, picture=picture, fingerprint=fingerprint)
         self._watching = asyncio.create_task(self._watch())
 

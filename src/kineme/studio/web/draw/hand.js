@@ -5,7 +5,7 @@ const [WRIST, THUMB, INDEX, KNUCKLE] = [0, 4, 8, 9]; // among the 21 landmarks o
 const [CLOSED, OPEN] = [0.3, 0.45]; // distance from thumb to index finger, in lengths of the palm
 const PATIENCE = 500; // without landmarks, after which the hand has gone [ms]
 
-/** @typedef {{points: number[][], time: number, aspect: number}} Landmarks As at /api/live; the picture's y points down. */
+/** @typedef {{points: number[][], time: number, aspect: number}} Landmarks As /api/live takes them; y points down. */
 
 /**
  * @param {import("./picture.js").Picture} picture
