@@ -16,6 +16,7 @@ let sent = 0; // samples of it
 let over = false; // it has ended, and the studio is still to be told
 let busy = false;
 let lost = true;
+let allowed = false; // the person was asked, where the browser wants that
 /** @type {{time: number, right: number[], up: number[]}|null} The plane that is drawn on, as the button was pressed. */
 let plane = null;
 
@@ -91,8 +92,9 @@ function turned({ alpha, beta, timeStamp }) {
 async function release() {
   button.classList.remove("held");
   if (ink.length) return hearer.ends();
-  const ask = /** @type {any} */ (window.DeviceOrientationEvent)?.requestPermission; // iPhones want it after a touch
-  const may = ask && (await ask()) === "granted";
+  const { requestPermission: ask } = /** @type {any} */ (window.DeviceOrientationEvent ?? {}); // only after a touch
+  const may = !allowed && ask && (await ask()) === "granted";
+  allowed = true;
   note(may ? "Now hold the button and move" : "This phone does not tell how it turns. Draw with a finger");
 }
 
