@@ -8,6 +8,7 @@ import socket
 import ssl
 import time
 from contextlib import ExitStack, closing, suppress
+from ipaddress import ip_address
 
 import httpx
 import numpy as np
@@ -223,7 +224,7 @@ def test_a_flood_of_connections_leaves_the_studio_free_and_ends(studio, asked, m
 
 def test_no_more_connections_are_open_than_a_few(monkeypatch):
     monkeypatch.setattr(wand, "_MOST_SOCKETS", 2)
-    with closing(wand.listening_at("127.0.0.1")) as listening, ExitStack() as opened:
+    with closing(wand.listening_at(ip_address("127.0.0.1"))) as listening, ExitStack() as opened:
         for _ in range(3):
             opened.enter_context(socket.create_connection(listening.getsockname()))
         first, _ = listening.accept()
@@ -279,18 +280,21 @@ def test_a_phone_that_says_nothing_has_gone(studio, ask, monkeypatch):
         assert json.loads(page.recv(60))["source"]["gone"]
 
 
-@pytest.mark.parametrize(
-    "host", ["0.0.0.0", "::", "8.8.8.8", "2001:4860:4860::8888", "224.0.0.1", "localhost", "", "x" * 999]
-)
+PUBLIC = ["0.0.0.0", "::", "8.8.8.8", "2001:4860:4860::8888", "224.0.0.1", "::ffff:0.0.0.0", "::ffff:8.8.8.8"]
+
+
+@pytest.mark.parametrize("host", PUBLIC)
 def test_only_addresses_of_local_networks_are_listened_at(asked, host):
     with pytest.raises(SpecificationError, match="in a local network"):
-        wand.listening_at(host)
+        wand.listening_at(ip_address(host))
     assert asked.studio.post("/api/wand", json={"host": host}).status_code == 400
+    for name in ("localhost", "", "x" * 999, 5.5):
+        assert asked.studio.post("/api/wand", json={"host": name}).status_code == 422
 
 
 def test_an_address_of_another_machine_is_refused():
     with pytest.raises(DataError, match=r"expected an address of this machine, got 192\.168\.254\.253"):
-        wand.listening_at("192.168.254.253")
+        wand.listening_at(ip_address("192.168.254.253"))
 
 
 def test_without_a_network_the_person_is_told(monkeypatch):

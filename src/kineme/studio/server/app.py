@@ -161,7 +161,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     try:
         yield
     finally:
-        await wand.close_wand(app)
+        wand.close_wand(app)
         watching.cancel()
         with suppress(asyncio.CancelledError):
             await watching

@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, FastAPI, Request
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, IPvAnyAddress
 from starlette.types import Receive, Scope, Send
 
 from kineme.errors import DataError, KinemeError, SpecificationError
@@ -31,7 +31,7 @@ from kineme.io.records import needs
 from kineme.studio.server.access import Guard
 from kineme.studio.server.connections import BACKLOG, LimitedConnection, config_of
 from kineme.studio.server.live_socket import LiveSession, parsed_samples
-from kineme.studio.server.records import Number, RequestBody, Text
+from kineme.studio.server.records import Number, RequestBody
 from kineme.studio.server.refusals import answer, refuse
 
 PORT = 8421  # unless it is taken
@@ -49,13 +49,15 @@ _KINDS = {"/": b"text/html; charset=utf-8", "css": b"text/css", "js": b"text/jav
 _PARTS = ("canvas", "elements", "lines", "stroke")
 _FILES = ("wand.html", "tokens.css", "wand.css", "wand/wand.js", *(f"parts/{name}.js" for name in _PARTS))
 
+Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+
 router = APIRouter(prefix="/api/wand", tags=["wand"])
 
 
 class WandRequest(RequestBody):
     """An address of this machine, or None for the usual one; the canvas's height in units of the library."""
 
-    host: Text | None = None
+    host: IPvAnyAddress | None = None
     height: Number = Field(1.0, gt=0)
     n_dims: Literal[2, 3] = 2
 
@@ -78,9 +80,10 @@ async def wand_of(request: Request) -> WandOut:
 @router.post("")
 async def open_wand(request: Request, wanted: WandRequest) -> WandOut:
     """Listen for a phone on the local network; what listened before ends."""
-    await close_wand(request.app)
+    close_wand(request.app)
     wand = Wand(request.app, wanted)
     await wand.open()
+    close_wand(request.app)  # that another page has opened meanwhile
     request.app.state.wand = wand
     return wand.shown
 
@@ -88,11 +91,11 @@ async def open_wand(request: Request, wanted: WandRequest) -> WandOut:
 @router.delete("")
 async def end_wand(request: Request) -> WandOut:
     """Listen no more."""
-    await close_wand(request.app)
+    close_wand(request.app)
     return WandOut()
 
 
-async def close_wand(app: FastAPI) -> None:
+def close_wand(app: FastAPI) -> None:
     """End what listens for a phone, if anything does."""
     wand, app.state.wand = app.state.wand, None
     if wand is not None:
@@ -104,7 +107,7 @@ class Wand:
 
     def __init__(self, app: FastAPI, wanted: WandRequest) -> None:
         self.app, self.wanted = app, wanted
-        self.host = local_address() if wanted.host is None else wanted.host.strip()
+        self.host = wanted.host or ipaddress.ip_address(local_address())
         self.token = secrets.token_urlsafe(24)
         self.phones: dict[str, Phone] = {}
         web = files("kineme").joinpath("studio", "web")
@@ -118,16 +121,12 @@ class Wand:
             import segno
         from uvicorn.server import ServerState
 
-        listening = listening_at(self.host)
-        try:
-            context, fingerprint = certificate_of(self.host)
-        except DataError:
-            listening.close()
-            raise
-        config = config_of(Guard(self, self.token, hosts=(self.host,), command="the studio"))
+        context, fingerprint = certificate_of(self.host)
+        config = config_of(Guard(self, self.token, hosts=(str(self.host),), command="the studio"))
         config.ws = "none"
         config.load()
         state, loop = ServerState(), asyncio.get_running_loop()
+        listening = listening_at(self.host)
         self._server = await loop.create_server(
             lambda: LimitedConnection(config, state, {}, loop),
             sock=listening,
@@ -136,7 +135,7 @@ class Wand:
             backlog=BACKLOG,
         )
         self._connections = state.connections
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        host = f"[{self.host}]" if self.host.version == 6 else self.host
         address = f"https://{host}:{listening.getsockname()[1]}/?token={self.token}"
         picture = segno.make(address, error="m").svg_data_uri(border=4, dark="#000", light="#fff", omitsize=True)
         self.shown = WandOut(address=address, picture=picture, fingerprint=fingerprint)
@@ -186,8 +185,7 @@ class Wand:
             await asyncio.sleep(LOOKS)
             for name in [name for name, phone in self.phones.items() if clock() - phone.heard > AWAY]:
                 self.app.state.sources.remove(self.phones.pop(name).source)
-        self.app.state.wand = None
-        self.close()
+        close_wand(self.app)
 
     async def hear(self, content: dict[str, Any]) -> dict[str, Any]:
         """Take in what the page of a phone sent, and return the name of its movement so far, or raise a DataError."""
@@ -264,24 +262,19 @@ def local_address() -> str:
     )
 
 
-def listening_at(host: str) -> socket.socket:
+def listening_at(host: Address) -> socket.socket:
     """Open a socket that listens at an address of a local network that this machine has; else a KinemeError."""
-    try:
-        address = ipaddress.ip_address(host)
-        is_local = not (address.is_global or address.is_unspecified or address.is_multicast)
-    except ValueError:
-        is_local = False
-    if not is_local:
+    is_mapped = getattr(host, "ipv4_mapped", None) is not None  # of which Pythons differ whether it is global
+    if host.is_global or host.is_unspecified or host.is_multicast or is_mapped:
         raise SpecificationError(
-            f"expected the address of this machine in a local network, such as 192.168.1.20, got {host[:80]!r}; "
-            "write that address"
+            f"expected the address of this machine in a local network, such as 192.168.1.20, got {host}; write that one"
         )
-    listening = _FewSockets(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    listening = _FewSockets(socket.AF_INET6 if host.version == 6 else socket.AF_INET)
     try:
         with suppress(OSError):
-            listening.bind((host, PORT))
+            listening.bind((str(host), PORT))
         if listening.getsockname()[1] != PORT:
-            listening.bind((host, 0))
+            listening.bind((str(host), 0))
         listening.listen(BACKLOG)
     except OSError as error:
         listening.close()
@@ -290,10 +283,10 @@ def listening_at(host: str) -> socket.socket:
     return listening
 
 
-def certificate_of(host: str) -> tuple[ssl.SSLContext, str]:
+def certificate_of(host: Address) -> tuple[ssl.SSLContext, str]:
     """Make a certificate for an address, signed by itself, and return it for a server, with its fingerprint (SHA-256).
 
-    The key is made anew each time, lies in a file for a moment that only this user can read, and is kept nowhere.
+    The key is made anew each time, and lies in a folder that only this user can read, until the server has it.
     """
     with needs("cryptography", "encrypt what a phone sends", "studio"):
         from cryptography import x509
@@ -310,7 +303,7 @@ def certificate_of(host: str) -> tuple[ssl.SSLContext, str]:
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(hours=_HOURS))  # clocks of phones differ
         .not_valid_after(now + timedelta(hours=_HOURS))
-        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address(host))]), critical=False)
+        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(host)]), critical=False)
         .add_extension(x509.ExtendedKeyUsage([x509.ObjectIdentifier(_SERVER)]), critical=False)
         .sign(key, hashes.SHA256())
     )
@@ -319,7 +312,6 @@ def certificate_of(host: str) -> tuple[ssl.SSLContext, str]:
     private = key.private_bytes(encoding, form, serialization.NoEncryption())
     with TemporaryDirectory() as folder:
         path = Path(folder, "wand.pem")
-        path.touch(0o600)
         path.write_bytes(private + certificate.public_bytes(encoding))
         context.load_cert_chain(path)
     return context, certificate.fingerprint(hashes.SHA256()).hex(":").upper()
