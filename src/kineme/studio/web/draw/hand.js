@@ -1,7 +1,9 @@
 // A hand that a camera sees: its index finger draws while the thumb touches it.
 import { currentView } from "../parts/views.js";
 
-const [WRIST, THUMB, INDEX, KNUCKLE] = [0, 4, 8, 9]; // among the 21 landmarks of a hand
+const INDEX = 8; // the tip of the index finger, among the 21 landmarks of a hand
+const PINCH = [4, INDEX]; // tips of thumb and index finger
+const PALM = [0, 9]; // its ends
 const [CLOSED, OPEN] = [0.3, 0.45]; // distance from thumb to index finger, in lengths of the palm
 const PATIENCE = 500; // without landmarks, after which the hand has gone [ms]
 
@@ -32,9 +34,8 @@ export function handPen(picture, hear) {
     if (currentView() !== "draw") return leave();
     const middle = board.width / board.height / 2;
     const hand = points.map(([x, y]) => [middle + (x - 0.5) * aspect, 1 - y]);
-    const apart = (/** @type {number} */ a, /** @type {number} */ b) =>
-      Math.hypot(hand[a][0] - hand[b][0], hand[a][1] - hand[b][1]);
-    const pinch = apart(THUMB, INDEX) / apart(WRIST, KNUCKLE);
+    const [pinched, palm] = [PINCH, PALM].map(([a, b]) => Math.hypot(hand[a][0] - hand[b][0], hand[a][1] - hand[b][1]));
+    const pinch = pinched / palm;
     if (pinch > OPEN) lift();
     if (pinch < CLOSED && !down) {
       down = hear.begins("hand");

@@ -34,30 +34,21 @@ async function tell() {
     const of = ink;
     const samples = ink.slice(sent, sent + MOST);
     const finish = over && sent + samples.length === ink.length;
-    if (!(await isHeard({ id, begin: sent === 0, samples, finish }))) {
-      await new Promise((done) => setTimeout(done, 1000));
-    } else if (of === ink) {
+    const body = JSON.stringify({ id, begin: sent === 0, samples, finish });
+    const said = await fetch("/api/samples", { method: "POST", body, signal: AbortSignal.timeout(5000) })
+      .then((response) => response.json())
+      .catch(() => ({ error: "No longer connected. Open Use a phone in the studio and scan the new code" }));
+    if (said.error || said.label) note(said.error ?? `${said.certainty} ${said.label}`);
+    else if (said.certainty === "new") note("New. Name it in the studio");
+    else if (lost || finish) note("Draw below with a finger");
+    lost = Boolean(said.error);
+    if (lost) await new Promise((done) => setTimeout(done, 1000));
+    else if (of === ink) {
       sent += samples.length;
       over &&= !finish;
     }
   } while (sent < ink.length || over);
   busy = false;
-}
-
-/** @param {Record<string, any>} message */
-async function isHeard(message) {
-  const headers = { "Content-Type": "application/json" };
-  const options = { method: "POST", headers, body: JSON.stringify(message), signal: AbortSignal.timeout(5000) };
-  const said = await fetch("/api/samples", options).then(
-    (response) => response.json(),
-    () => null,
-  );
-  if (!said) note("No longer connected. Open Use a phone in the studio and scan the new code");
-  else if (said.error || said.label) note(said.error ?? `${said.certainty} ${said.label}`);
-  else if (said.certainty === "new") note("New. Name it in the studio");
-  else if (lost || message.finish) note("Draw below with a finger");
-  lost = !said;
-  return !lost;
 }
 
 /** @type {import("../parts/stroke.js").Hearer} */
