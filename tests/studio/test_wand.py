@@ -7,6 +7,7 @@ import json
 import socket
 import ssl
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, suppress
 from ipaddress import ip_address
 
@@ -50,8 +51,8 @@ class Asked:
         headers = {"Authorization": f"Bearer {self.token}", "Origin": self.url.rstrip("/")}
         return self.phone.post("/api/samples", json={"id": "a phone"} | message, headers=headers)
 
-    def listens(self):
-        with suppress(OSError), closing(socket.create_connection(("127.0.0.1", self.port), timeout=5)):
+    def listens(self, port=None):
+        with suppress(OSError), closing(socket.create_connection(("127.0.0.1", port or self.port), timeout=5)):
             return True
         return False
 
@@ -179,7 +180,7 @@ NONSENSE = [
     b'{"id": "x", "samples": [[0, 1]]}',
     b'{"id": "x", "samples": [[0, 1, 1e400]]}',
     b'{"id": "x", "samples": "many"}',
-    b'{"id": "x", "samples": [' + b"[0, 1, 2]," * 10_000 + b"[0, 1, 2]]}",
+    b'{"id": "x", "samples": [' + b"[0, 1, 2]," * 8_000 + b"[0, 1, 2]]}",
 ]
 
 
@@ -195,14 +196,23 @@ def test_nonsense_is_refused_in_a_sentence_and_the_phone_goes_on(asked):
     assert "at most" in asked.tell(id="a fifth").json()["error"]
 
 
-def test_a_body_that_stops_arriving_is_given_up(asked, monkeypatch):
-    monkeypatch.setattr(wand, "_SECONDS", 0.3)
+@pytest.mark.parametrize(("body", "said"), [(b"1\r\n{\r\n", b"got nothing"), (b"20000\r\n" + 2**17 * b" ", b"at most")])
+def test_a_body_that_stops_arriving_or_never_ends_is_given_up(asked, monkeypatch, body, said):
+    monkeypatch.setattr(wand, "_SECONDS", 0.5)
     context = ssl._create_unverified_context()
     with socket.create_connection(("127.0.0.1", asked.port)) as plain, context.wrap_socket(plain) as phone:
         head = f"POST /api/samples HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer {asked.token}\r\n"
-        phone.sendall(f"{head}Content-Length: 99\r\n\r\n{{".encode())
+        phone.sendall(f"{head}Transfer-Encoding: chunked\r\n\r\n".encode() + body)
         phone.settimeout(60)
-        assert b"got nothing" in phone.recv(4096) + phone.recv(4096)
+        assert said in phone.recv(4096) + phone.recv(4096)
+
+
+def test_whoever_does_not_begin_to_speak_is_closed(studio, ask, monkeypatch):
+    monkeypatch.setattr(wand, "_SECONDS", 0.2)
+    with closing(socket.create_connection(("127.0.0.1", ask(studio).port))) as silent:
+        silent.settimeout(60)
+        with suppress(ConnectionError):
+            assert silent.recv(1) == b""
 
 
 def test_a_flood_of_connections_leaves_the_studio_free_and_ends(studio, asked, monkeypatch):
@@ -247,6 +257,17 @@ def test_it_ends_when_the_person_ends_it_or_asks_anew(asked):
     assert asked.studio.delete("/api/wand").json()["address"] is None
     assert not asked.listens()
     assert asked.studio.get("/api/wand").json()["address"] is None
+
+
+def test_of_several_that_are_asked_for_at_once_one_listens(asked):
+    def anew(_):
+        answer = httpx.post(asked.studio.base_url.join("/api/wand"), json=LOOPBACK, headers=BEARER, timeout=60)
+        return httpx.URL(answer.json()["address"]).port
+
+    with ThreadPoolExecutor(4) as pool:
+        ports = set(pool.map(anew, range(8)))
+    last = httpx.URL(asked.studio.get("/api/wand").json()["address"]).port
+    assert [port for port in ports if asked.listens(port)] == [last]
 
 
 def test_it_ends_when_nothing_has_moved_for_a_while_and_with_the_studio(folder, ask, monkeypatch):
