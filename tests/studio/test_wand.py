@@ -120,6 +120,11 @@ def test_a_movement_of_a_phone_is_shown_and_named(studio, ask, height):
         assert json.loads(page.recv(60))["source"]["gone"]
 
 
+def test_a_movement_that_was_not_ended_is_forgotten_when_another_begins(asked):
+    asked.tell(begin=True, samples=_drawn(3)[:50])
+    assert asked.tell(begin=True, samples=_drawn(2), finish=True).json()["label"] == "kind 2"
+
+
 def test_a_library_in_space_gets_a_plane(studio, ask):
     asked = ask(studio, n_dims=3)
     phone = asked.tell(begin=True, samples=_drawn(1), finish=True)
@@ -129,7 +134,8 @@ def test_a_library_in_space_gets_a_plane(studio, ask):
 
 def test_without_the_token_there_is_nothing(asked):
     for token in ("", "?token=wrong", f"?token={asked.token}x"):
-        assert asked.phone.get(f"/{token}").status_code == 401
+        refused = asked.phone.get(f"/{token}", headers={"Accept": "text/html"})
+        assert (refused.status_code, "Use a phone" in refused.text) == (401, True)
         assert asked.phone.get(f"/wand/wand.js{token}").status_code == 401
         assert asked.phone.post(f"/api/samples{token}", json={"id": "x"}).status_code == 401
     assert asked.phone.get("/", headers={"Host": "studio.example"}).status_code == 403

@@ -19,11 +19,11 @@ from datetime import UTC, datetime, timedelta
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, FastAPI, Request
-from pydantic import BaseModel, Field, IPvAnyAddress
+from pydantic import AfterValidator, BaseModel, Field
 from starlette.types import Receive, Scope, Send
 
 from kineme.errors import DataError, KinemeError, SpecificationError
@@ -31,7 +31,7 @@ from kineme.io.records import needs
 from kineme.studio.server.access import Guard
 from kineme.studio.server.connections import BACKLOG, LimitedConnection, config_of
 from kineme.studio.server.live_socket import LiveSession, parsed_samples
-from kineme.studio.server.records import Number, RequestBody
+from kineme.studio.server.records import Number, RequestBody, Text
 from kineme.studio.server.refusals import answer, refuse
 
 PORT = 8421  # unless it is taken
@@ -57,7 +57,7 @@ router = APIRouter(prefix="/api/wand", tags=["wand"])
 class WandRequest(RequestBody):
     """An address of this machine, or None for the usual one; the canvas's height in units of the library."""
 
-    host: IPvAnyAddress | None = None
+    host: Annotated[Text, AfterValidator(lambda text: str(ipaddress.ip_address(text)))] | None = None
     height: Number = Field(1.0, gt=0)
     n_dims: Literal[2, 3] = 2
 
@@ -107,7 +107,7 @@ class Wand:
 
     def __init__(self, app: FastAPI, wanted: WandRequest) -> None:
         self.app, self.wanted = app, wanted
-        self.host = wanted.host or ipaddress.ip_address(local_address())
+        self.host = ipaddress.ip_address(wanted.host or local_address())
         self.token = secrets.token_urlsafe(24)
         self.phones: dict[str, Phone] = {}
         web = files("kineme").joinpath("studio", "web")
