@@ -131,6 +131,7 @@ export const breakable = (name) =>
  *   "robot-slow": HTMLInputElement,
  *   duration: HTMLInputElement,
  *   file: HTMLInputElement,
+ *   name: HTMLInputElement,
  *   find: HTMLInputElement,
  *   playhead: HTMLInputElement,
  *   tilt: HTMLInputElement,
