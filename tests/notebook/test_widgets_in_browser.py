@@ -96,6 +96,12 @@ def test_a_goal_is_dragged_and_read_in_python(show):
     expected = move.primitive.rollout(goal=move.goal, n_samples=len(move.path)).positions[0]
     np.testing.assert_allclose(move.path.positions, expected, atol=1e-4 * np.ptp(expected))
     assert cell.page.evaluate("model.get('drawn')") == []  # what is drawn beside it is nothing
+    again = show(move)  # as where the cell is scrolled out of sight and back
+    wait_until(again.frame, "kineme.state.moving?.name === 'GShape'")
+    np.testing.assert_allclose(again.frame.evaluate("kineme.state.moving.goal"), move.goal)
+    again.take()
+    np.testing.assert_allclose(move.goal, again.widget.goal)
+    assert again.widget.goal[0] > primitives.goals[1, 0] + 1
 
 
 @pytest.mark.parametrize("dark", [False, True])

@@ -41,7 +41,7 @@ const hearer = {
 };
 
 /** Show the drawings that the notebook has. */
-hearNotebook((drawn) => {
+hearNotebook(({ drawn }) => {
   write(byId("count"), drawn.length ? counted(drawn.length, "drawing") : "No drawing yet");
   const items = drawn.slice(-SHOWN).map(([name, samples]) => {
     const words = name === null ? ["no name"] : breakable(name);

@@ -251,10 +251,14 @@ function start() {
       for (const picture of [stage, symbols]) picture.turn(angles);
     });
   become({});
-  hearNotebook(() => {});
-  if (!header.early) return choose(header.classes[0]); // it moves, and recognizes nothing
+  // Primitives alone recognize nothing; what moves there is where it was before the cell was shown again.
+  hearNotebook(({ moved: { name, ...place } }) => {
+    if (header.early || state.moving) return;
+    choose(name);
+    update(place);
+  });
   // What is drawn first should not wait for what is made once.
-  window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
+  if (header.early) window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
 }
 
 start();

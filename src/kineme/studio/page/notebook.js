@@ -16,7 +16,8 @@ export default {
         .color.match(/[\d.]+/g)
         .map(Number);
       const dark = r + g + b > 384; // where the notebook's text is light
-      frame.contentWindow?.postMessage({ drawn: model.get("drawn"), dark }, "*");
+      frame.style.colorScheme = dark ? "dark" : "light";
+      frame.contentWindow?.postMessage({ dark, drawn: model.get("drawn"), moved: model.get("moved") }, "*");
     };
     const hear = (/** @type {MessageEvent} */ { source, data }) => {
       if (source !== frame.contentWindow) return;

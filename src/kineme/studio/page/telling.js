@@ -9,14 +9,14 @@ const dark = rules.find(({ media }) => media?.mediaText.includes("color-scheme")
 /** @param {Object} message See notebook.js. */
 export const tell = (message) => inNotebook && parent.postMessage(message, "*");
 
-/** @param {(drawn: any[]) => void} hear Of all drawings that the notebook has. */
+/** @param {(state: {drawn: any[], moved: any}) => void} hear Of all drawings that the notebook has, and what moved last. */
 export function hearNotebook(hear) {
   window.addEventListener("message", ({ source, data }) => {
     if (!inNotebook || source !== parent) return;
     dark.mediaText = data.dark ? "all" : "not all"; // as the notebook is, whatever the system prefers
     document.documentElement.style.colorScheme = data.dark ? "dark" : "light";
     recolor();
-    hear(data.drawn);
+    hear(data);
   });
   new ResizeObserver(() => tell({ height: Math.ceil(document.body.offsetHeight) })).observe(document.body);
 }
