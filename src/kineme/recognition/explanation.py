@@ -176,6 +176,12 @@ class Explanation:
         title = [self.answer, *[_CONVOLUTIONS] * self.by_convolutions]
         return draw_explanation(title, self.path, self.columns, self.parts, panels)
 
+    def _repr_html_(self) -> str:
+        """Show the figure in a notebook, and say the same in words."""
+        from kineme.reporting.page import inline
+
+        return inline(self.plot(), self.in_words)
+
 
 class Rationale(NamedTuple):
     """What an answer rests on: the movement, and the examples that it is most like."""
