@@ -166,7 +166,7 @@ class Explanation:
         overlays = {"nearest": self.nearest, "next in rank": self.runner_up}
         panels = [
             Panel(
-                f"{role}: {overlay.label}, {overlay.similarity:.2f} alike",
+                f"{f'{role}: ' * (self.runner_up is not None)}{overlay.label}, {overlay.similarity:.2f} alike",
                 overlay.path,
                 by_part(self.path, overlay.path, self.parts),
             )
