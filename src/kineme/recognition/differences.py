@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,6 +86,10 @@ class Confusion:
         names = [*map(str, self.labels), _NEW]
         return data_frame({"class": names[:-1], **dict(zip(names, self.counts.T, strict=True))}).set_index("class")
 
+    @overload
+    def plot(self, ax: None = None) -> Figure: ...
+    @overload
+    def plot(self, ax: Axes) -> Axes: ...
     def plot(self, ax: Axes | None = None) -> Figure | Axes:
         """Draw the shares of the answers to each class; of more than 40 classes, those with most mistakes.
 
