@@ -8,7 +8,7 @@ import { createMoving, placed } from "./movements.js";
 import { openSnapshot } from "./snapshot.js";
 import { boxOf, Stage } from "./stage.js";
 import { createSymbols } from "./symbols.js";
-import { hearNotebook, tell } from "./telling.js";
+import { hearNotebook, tell, tellDrawn } from "./telling.js";
 
 const STEP = 0.03; // of the stage, by an arrow key
 const DRAWN = "Your drawing";
@@ -120,7 +120,7 @@ function finish() {
   const drawn = state.stroke;
   const place = { start: drawn.positions[0], goal: drawn.positions.at(-1) };
   following.finish();
-  tell({ drawn: [null, drawn.times.map((time, i) => [time, ...drawn.positions[i]])] });
+  tellDrawn([null, drawn.times.map((time, i) => [time, ...drawn.positions[i]])]);
   try {
     const answer = backend.recognize(drawn);
     const { encodes } = header.movements;
