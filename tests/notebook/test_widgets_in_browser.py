@@ -60,7 +60,7 @@ def test_movements_are_drawn_named_and_taken_back(show, width):
 def test_a_tap_is_no_movement(show):
     cell = show(Draw())
     cell.frame.click("#stage")
-    assert "too short" in cell.frame.inner_text("#hint")
+    assert "Too short" in cell.frame.inner_text("#hint")
     assert cell.page.evaluate("model.get('drawn')") == []
 
 

@@ -24,7 +24,7 @@ const hearer = {
   },
   ends: () => {
     if (picture.ink.length >= FEWEST) tellDrawn([byId("name").value.trim() || null, picture.ink]);
-    else write(byId("hint"), "That was too short: press, draw, and let go at the end");
+    else write(byId("hint"), "Too short: press, draw, and let go at the end");
   },
   pen: (at) => {
     picture.pen = at;
@@ -37,8 +37,8 @@ followKeys(byId("stage"), hearer);
 hearNotebook(({ drawn }) => {
   write(byId("count"), drawn.length ? counted(drawn.length, "drawing") : "No drawing yet");
   const items = drawn.slice(-SHOWN).map(([name, samples]) => {
-    const words = breakable(name ?? "no name");
-    return make("li", {}, thumbnail(samples.map((sample) => sample.slice(1))), make("span", {}, ...words));
+    const path = samples.map((sample) => sample.slice(1));
+    return make("li", {}, thumbnail(path), make("span", {}, ...breakable(name ?? "no name")));
   });
   fill(byId("symbols"), ...items.reverse());
   byId("undo").disabled = byId("clear").disabled = !drawn.length;
