@@ -69,21 +69,81 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {(
- *   Record<"add-obstacle"| "add-span"| "add-via"| "ask-yes"| "draw-clear"| "draw-how"| "draw-move"|
- *   "episodes-before"| "episodes-next"| "draw-replay"| "draw-save"| "learn-file"| "learn-spans"| "move-play"|
- *   "move-reset"| "naming-learn"| "play-recording"| "robot-draw"| "robot-go"| "save-corrections"| "show-unlabeled"|
- *   "spot-page"| "zoom-in"| "zoom-out"| "clear"| "export"| "help"| "merge"| "play"| "reset"| "save"| "spot"| "undo",
- *   HTMLButtonElement> &
- *   Record<"draw-canvas"| "move-canvas"| "plot-acceleration"| "plot-speed"| "timeline-canvas"| "canvas"| "map"|
- *   "stage", HTMLCanvasElement> &
- *   Record<"live-source"| "robot-preflight"| "history"| "why", HTMLDetailsElement> &
- *   Record<"ask"| "keys", HTMLDialogElement> &
- *   Record<"pick-part"| "channels"| "formulations"| "styles", HTMLFieldSetElement> &
- *   Record<"ask-name"| "episodes-from"| "find-pick"| "find-symbol"| "naming-name"| "robot-dragged"| "robot-size"|
- *   "robot-slow"| "duration"| "file"| "name"| "find"| "playhead"| "tilt"| "time"| "turn", HTMLInputElement> &
- *   Record<"export-format"| "robot-arm"| "robot-what"| "camera"| "formulation"| "tables", HTMLSelectElement> &
- *   Record<"spans", HTMLTableElement> &
- *   Record<"video", HTMLVideoElement>
- * )} Elements
+ * @typedef {{
+ *   "add-obstacle": HTMLButtonElement,
+ *   "add-span": HTMLButtonElement,
+ *   "add-via": HTMLButtonElement,
+ *   "ask-yes": HTMLButtonElement,
+ *   "draw-clear": HTMLButtonElement,
+ *   "draw-how": HTMLButtonElement,
+ *   "draw-move": HTMLButtonElement,
+ *   "episodes-before": HTMLButtonElement,
+ *   "episodes-next": HTMLButtonElement,
+ *   "draw-replay": HTMLButtonElement,
+ *   "draw-save": HTMLButtonElement,
+ *   "learn-file": HTMLButtonElement,
+ *   "learn-spans": HTMLButtonElement,
+ *   "move-play": HTMLButtonElement,
+ *   "move-reset": HTMLButtonElement,
+ *   "naming-learn": HTMLButtonElement,
+ *   "play-recording": HTMLButtonElement,
+ *   "robot-draw": HTMLButtonElement,
+ *   "robot-go": HTMLButtonElement,
+ *   "save-corrections": HTMLButtonElement,
+ *   "show-unlabeled": HTMLButtonElement,
+ *   "spot-page": HTMLButtonElement,
+ *   "zoom-in": HTMLButtonElement,
+ *   "zoom-out": HTMLButtonElement,
+ *   clear: HTMLButtonElement,
+ *   export: HTMLButtonElement,
+ *   help: HTMLButtonElement,
+ *   merge: HTMLButtonElement,
+ *   play: HTMLButtonElement,
+ *   reset: HTMLButtonElement,
+ *   save: HTMLButtonElement,
+ *   spot: HTMLButtonElement,
+ *   undo: HTMLButtonElement,
+ *   "draw-canvas": HTMLCanvasElement,
+ *   "move-canvas": HTMLCanvasElement,
+ *   "plot-acceleration": HTMLCanvasElement,
+ *   "plot-speed": HTMLCanvasElement,
+ *   "timeline-canvas": HTMLCanvasElement,
+ *   canvas: HTMLCanvasElement,
+ *   map: HTMLCanvasElement,
+ *   stage: HTMLCanvasElement,
+ *   "live-source": HTMLDetailsElement,
+ *   "robot-preflight": HTMLDetailsElement,
+ *   history: HTMLDetailsElement,
+ *   why: HTMLDetailsElement,
+ *   ask: HTMLDialogElement,
+ *   keys: HTMLDialogElement,
+ *   "pick-part": HTMLFieldSetElement,
+ *   channels: HTMLFieldSetElement,
+ *   formulations: HTMLFieldSetElement,
+ *   styles: HTMLFieldSetElement,
+ *   "ask-name": HTMLInputElement,
+ *   "episodes-from": HTMLInputElement,
+ *   "find-pick": HTMLInputElement,
+ *   "find-symbol": HTMLInputElement,
+ *   "naming-name": HTMLInputElement,
+ *   "robot-dragged": HTMLInputElement,
+ *   "robot-size": HTMLInputElement,
+ *   "robot-slow": HTMLInputElement,
+ *   duration: HTMLInputElement,
+ *   file: HTMLInputElement,
+ *   name: HTMLInputElement,
+ *   find: HTMLInputElement,
+ *   playhead: HTMLInputElement,
+ *   tilt: HTMLInputElement,
+ *   time: HTMLInputElement,
+ *   turn: HTMLInputElement,
+ *   "export-format": HTMLSelectElement,
+ *   "robot-arm": HTMLSelectElement,
+ *   "robot-what": HTMLSelectElement,
+ *   camera: HTMLSelectElement,
+ *   formulation: HTMLSelectElement,
+ *   tables: HTMLSelectElement,
+ *   spans: HTMLTableElement,
+ *   video: HTMLVideoElement,
+ * }} Elements
  */
