@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -64,7 +65,9 @@ def test_a_library_is_shown_by_its_symbols(tmp_path):
 
 
 def test_an_explanation_is_its_picture_on_white_and_its_words():
+    before = plt.get_fignums()
     text = kineme.Recognizer().fit(DEMOS).recognize(DEMOS[2]).explain()._repr_html_()
+    assert plt.get_fignums() == before  # else the notebook would show it once more
     assert 'src="data:image/svg+xml;base64,' in text
     assert "<figcaption>looks like \\x1b[31mred: the same as an example" in text
 

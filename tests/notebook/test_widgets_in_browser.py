@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from browsing import Pages, wait_until
+from browsing import Pages, stroke, wait_until
 
 pytest.importorskip("anywidget", reason="the extra notebook is not installed")
 from widget_samples import Cell, demonstrations
@@ -78,11 +78,13 @@ def test_a_drawing_is_recognized_in_the_cell_and_in_python(show):
 def test_a_goal_is_dragged_and_read_in_python(show):
     primitives = kineme.DMP().learn(demonstrations()[[0, 3]])
     cell = show(Move(primitives))
-    cell.draw_area = cell.frame.locator("#stage").bounding_box()
+    area = cell.frame.locator("#stage").bounding_box()
     cell.frame.get_by_role("button", name="GShape").click()
     wait_until(cell.page, "model.get('moved').name === 'GShape'")
-    x, y = cell.frame.evaluate("kineme.stage.project(kineme.state.moving.goal)")
-    start = np.array([cell.draw_area["x"] + x, cell.draw_area["y"] + y])
+    corner = np.array([area["x"], area["y"]]) + 6.5
+    stroke(cell.page, corner + np.outer(np.arange(8), [3, 1]), np.linspace(0, 0.2, 8))
+    x, y = cell.frame.evaluate("kineme.stage.project(kineme.state.moving.goal)")  # what is drawn beside it is nothing
+    start = np.array([area["x"] + x, area["y"] + y])
     cell.page.mouse.move(*start)
     cell.page.mouse.down()
     cell.page.mouse.move(*(start + np.array([30, 40])), steps=3)
@@ -95,13 +97,36 @@ def test_a_goal_is_dragged_and_read_in_python(show):
     assert move.primitive.labels.tolist() == ["GShape"]
     expected = move.primitive.rollout(goal=move.goal, n_samples=len(move.path)).positions[0]
     np.testing.assert_allclose(move.path.positions, expected, atol=1e-4 * np.ptp(expected))
-    assert cell.page.evaluate("model.get('drawn')") == []  # what is drawn beside it is nothing
+    assert cell.page.evaluate("model.get('drawn')") == []
     again = show(move)  # as where the cell is scrolled out of sight and back
     wait_until(again.frame, "kineme.state.moving?.name === 'GShape'")
     np.testing.assert_allclose(again.frame.evaluate("kineme.state.moving.goal"), move.goal)
     again.take()
     np.testing.assert_allclose(move.goal, again.widget.goal)
     assert again.widget.goal[0] > primitives.goals[1, 0] + 1
+
+
+def test_what_is_drawn_is_as_light_as_a_dark_notebook_needs(show):
+    """Colors that were taken before the notebook said that it is dark are taken anew."""
+    cell = show(Draw(), dark=True, color_scheme="light")
+    cell.draw()
+    pixels = """(() => {
+      const canvas = document.getElementById("stage");
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const colors = {};
+      for (let k = 0; k < data.length; k += 4)
+        if (data[k + 3] === 255) colors[data.slice(k, k + 3)] = (colors[data.slice(k, k + 3)] ?? 0) + 1;
+      return Object.entries(colors).sort((a, b) => b[1] - a[1])[0][0];
+    })()"""
+    wait_until(cell.frame, f"{pixels} === '86,180,233'")  # --ink of the dark palette
+
+
+def test_only_the_page_of_the_cell_is_heard(show):
+    cell = show(Draw())
+    cell.page.evaluate("window.postMessage({ drawn: [['x', []]], moved: { name: 'x' } }, '*')")
+    cell.draw()  # heard after it
+    assert len(cell.widget.drawn) == 1
+    assert cell.widget.moved == {}
 
 
 @pytest.mark.parametrize("dark", [False, True])
