@@ -25,7 +25,9 @@ from kineme.cli import main
 DOCS = Path(__file__).parent
 GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
 #: Package -> words of the commands that need it.
-OPTIONAL = {"jax": (), "mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute")}
+OPTIONAL = {"jax": (), "mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute"), "anywidget": ()}
+#: Package -> how blocks of Python begin that need it, where that is not its import.
+_BEGUN = {"anywidget": "from kineme.notebook import"}
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
@@ -54,7 +56,9 @@ def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Itera
     """Run a page in an empty folder, step by step; `names` are what its Python defines."""
     names = {} if names is None else names
     for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
-        if kind == "python" and any(text.startswith(f"import {package}\n") for package in _missing()):
+        if kind == "python" and text.startswith(
+            tuple(_BEGUN.get(package, f"import {package}\n") for package in _missing())
+        ):
             continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)
 

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import re
+import sys
 from base64 import b64encode
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
+
 from kineme.reporting.text import in_markup
+from kineme.sampling import evenly_spaced
+from kineme.validation import Array
+
+_POINTS = 64  # of a thumbnail, at most
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -29,12 +36,44 @@ footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid
 """
 
 
+def thumbnail(path: Array) -> str:
+    """Draw a path (T, d) as a small picture in the color of the text around it, with a dot where it starts.
+
+    One dimension is drawn over the phase, more than two in the plane in which the path is widest. It has 64 points at
+    most, so that a table of them stays small.
+    """
+    points = path[evenly_spaced(len(path), _POINTS)]
+    if points.shape[1] == 1:
+        points = np.column_stack((np.linspace(0.0, 1.0, len(points)), points / (np.ptp(points) or 1.0)))
+    elif points.shape[1] > 2:
+        from kineme.reporting.figures import principal_axes
+
+        points = points @ principal_axes(points.T).T
+    extent = np.ptp(points, axis=0)
+    shown = np.array([1.0, -1.0]) * (points - points.min(axis=0) - 0.5 * extent) * (84.0 / (extent.max() or 1.0)) + 50.0
+    line = "L".join(f"{x:.1f} {y:.1f}" for x, y in shown.tolist())
+    return (
+        '<svg width="48" height="48" viewBox="0 0 100 100" fill="none" stroke="currentColor" stroke-width="4" '
+        f'aria-hidden="true"><path d="M{line}"/><circle cx="{shown[0, 0]:.1f}" cy="{shown[0, 1]:.1f}" r="6" '
+        'fill="currentColor" stroke="none"/></svg>'
+    )
+
+
 def picture(svg: bytes, caption: str, head: str = "") -> str:
     """A figure element with the drawing inside; `head` stands before the visible caption."""
     return (
         f'<figure><img alt="{in_markup(caption)}" src="data:image/svg+xml;base64,{b64encode(svg).decode()}">'
         f"<figcaption>{in_markup(head + caption)}</figcaption></figure>"
     )
+
+
+def inline(figure: Any, caption: str) -> str:
+    """Return a figure that no one shows otherwise as markup, on white whatever the colors around it are."""
+    from kineme.reporting.figures import encode_figure
+
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
+        pyplot.close(figure)
+    return picture(encode_figure(figure, "svg"), caption)
 
 
 def filled(template: str, parts: dict[str, str], style: str, scripts: dict[str, str], allowed: str = "") -> str:

@@ -88,9 +88,9 @@ export const breakable = (name) =>
  *     "why", HTMLDetailsElement>
  *   & Record<"ask"|"importing"|"keys"|"phone", HTMLDialogElement>
  *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
- *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|
- *     "own-video"|"phone-host"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|"tilt"|"time"|
- *     "turn"|"video-start", HTMLInputElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"name"|
+ *     "naming-name"|"own-video"|"phone-host"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|
+ *     "tilt"|"time"|"turn"|"video-start", HTMLInputElement>
  *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|"save-format"|
  *     "tables", HTMLSelectElement>
  *   & Record<"importing-rows"|"spans", HTMLTableElement>
