@@ -18,7 +18,7 @@ _SECTIONS = {
     "io": ("Reading and writing files", "how-to/file-not-read.md", "guide/recordings.md"),
     "movements": ("Movements and their columns", "guide/columns.md"),
     "dmp": ("Learning and generating", "how-to/which-fit.md", "guide/moving-again.md", "guide/modulation.md"),
-    "features": ("Features", "guide/recognition.md#features-and-kernels-in-scikit-learn"),
+    "features": ("Features", "guide/scikit-learn.md"),
     "kernels": ("Kernels", "concepts/kernels.md"),
     "similarity": ("Comparing movements", "concepts/invariance.md", "guide/recognition.md"),
     "recognition": ("Recognizing", "how-to/everything-is-unknown.md", "guide/recognition.md"),
