@@ -19,13 +19,14 @@ pytestmark = pytest.mark.skipif(not (SITE / "search.html").is_file(), reason="KI
 KINDS = (
     "index", "start/install", "concepts/movement-primitive", "concepts/glossary", "how-to/file-not-read",
     "gallery/index", "gallery/primitives/plot_formulations", "guide/recordings", "reference/generated/kineme.DMP",
-    "reference/generated/kineme-learn", "beside-others", "search",
+    "reference/generated/kineme-learn", "beside-others", "search", "_static/draw-light",
 )  # fmt: skip
 COLORED = (
     "index",
     "concepts/movement-primitive",
     "reference/generated/kineme.kernels.RBF",
     "reference/generated/kineme-learn",
+    "_static/draw-dark",
 )
 WIDTHS = (390, 820, 1440)
 _STICKS_OUT = """() => [...document.querySelectorAll('article :is(h1, h2, h3, p, table, pre, img)')].filter((one) => {
@@ -74,6 +75,13 @@ QUESTIONS = {
     "kineme annotate": "reference/generated/kineme-annotate",
     "Primitives.rollout": "reference/generated/kineme.dmp.Primitives",
     "Recognizer": "reference/generated/kineme.Recognizer",
+    "rerun": "how-to/rerun",
+    "jupyter notebook": "guide/notebooks",
+    "real robot ur5": "guide/robots",
+    "save model": "guide/moving-again",
+    "draw in the browser": "guide/page",
+    "early recognition": "guide/early-and-live",
+    "scikit-learn pipeline": "guide/scikit-learn",
 }
 #: Error messages with what stood in them -> how the entry of the page of messages begins.
 MESSAGES = {
