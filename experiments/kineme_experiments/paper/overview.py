@@ -95,8 +95,8 @@ def draw_overview(draws: Draws) -> Figure:
         axes.plot(one.printed, y, "x", color=ORANGE, markersize=7, markeredgewidth=2, zorder=4)
     axes.set_yticks(range(len(compared)), [one.name for one in compared])
     axes.set(xlabel="accuracy", xlim=(0, 1.02), ylim=(len(compared) - 0.5, -0.5))
-    for y in (3.5, 7.5):
-        axes.axhline(y, color=GRAY, linewidth=0.5)
+    for between in (3.5, 7.5):
+        axes.axhline(between, color=GRAY, linewidth=0.5)
     marks = {"the paper": (ORANGE, "x"), f"ours, {CLOSEST}": (BLUE, "o"), f"ours, {DEFAULT}": (GREEN, "o")}
     for label, (color, mark) in marks.items():
         axes.plot([], [], mark, color=color, label=label, markeredgewidth=2 if mark == "x" else 1)
