@@ -33,7 +33,9 @@ _COLORS = 128  # of a picture of a tutorial
 DRAWING = {
     "start/first-success": "first",
     "tutorials/action-library": "library",
+    "tutorials/action-library-without-labels": "library",
     "tutorials/unlabeled-to-a-planner": "planner",
+    "tutorials/symbols-to-a-plan": "planner",
     "tutorials/a-plan-that-recovers": "plan",
 }
 FIGURES = {

@@ -27,6 +27,7 @@ GENERATED = ("gallery", "reference/generated")  #: folders that the build of the
 #: Package -> words of the commands that need it.
 OPTIONAL = {"mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute")}
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_AFTER = re.compile(r"^<!-- after: (.+\.md) -->$", re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
 
@@ -51,9 +52,16 @@ def page_name(page: Path) -> str:
 
 
 def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Iterator[Step]:
-    """Run a page in an empty folder, step by step; `names` are what its Python defines."""
+    """Run a page in an empty folder, step by step; `names` are what its Python defines.
+
+    A page that says ``<!-- after: another.md -->`` is run after that one.
+    """
     names = {} if names is None else names
-    for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
+    written = page.read_text(encoding="utf-8")
+    for earlier in _AFTER.findall(written):
+        for _ in walk(page.parent / earlier, folder, names):
+            pass
+    for kind, text in _BLOCK.findall(written):
         if kind == "python" and any(text.startswith(f"import {package}\n") for package in _missing()):
             continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)

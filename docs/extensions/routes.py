@@ -13,8 +13,8 @@ _LINK = "[{0}](#json-{0})"
 _REFERENCE = re.compile(r"#/components/schemas/(\w+)")
 _ABOUT = """
 What a program asks of `kineme studio`, by HTTP. How to find the token, and an example:
-[The studio](../../guide/studio.md). A studio that runs describes itself as OpenAPI, for programs that make clients
-from that: `GET /api/openapi.json`.
+[Samples from a program](../../guide/studio-network.md#samples-from-a-program). A studio that runs describes itself as
+OpenAPI, for programs that make clients from that: `GET /api/openapi.json`.
 """
 
 

@@ -19,7 +19,7 @@ from result_tables import people as people_tables
 from result_tables.measured import DOCS, RESULTS, figures, fill, rows, table
 
 #: Pages of the guide with one table or a few.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables, large_archives)
+GUIDES = (adapting_tables, modulation_tables, outlier_tables)
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "the defaults": ("", ("defaults",)),
@@ -177,7 +177,7 @@ if __name__ == "__main__":
     for module in GUIDES:
         fill(module.PAGE, module.tables())
     fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
-    for guide, texts in (recognition() | motion_layer.tables() | planning.tables()).items():
+    for guide, texts in (recognition() | large_archives.tables() | motion_layer.tables() | planning.tables()).items():
         fill(guide, texts)
     for page, texts in beside_tables.tables().items():
         fill(DOCS / page, texts)
