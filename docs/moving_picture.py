@@ -1,6 +1,7 @@
-"""The moving picture of the first page: a letter is drawn, recognized while it is drawn, and moved to new goals.
+"""Moving pictures: a letter is drawn, recognized and moved; a movement follows its goal around an obstacle.
 
-One SVG file, animated by its style sheet: no script, sharp at every size, still for readers who ask for less motion.
+Each is one SVG file, animated by its style sheet: no script, sharp at every size, by light and in the dark, still for
+readers who ask for less motion.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import kineme
+from kineme.control import ObstacleAvoidance
 from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
 
 _WIDTH, _HEIGHT, _PANEL = 760, 270, 240
@@ -114,6 +116,63 @@ def _goals(frame: _Frame, shown: kineme.Trajectory) -> Iterator[str]:
         yield f'<path class="moved" d="{_d(points)}"/>{_dot(end, "goal")}</g>'
 
 
+_FRAMES = 60  # of a movement that is controlled
+
+
+def moving_goal() -> str:
+    """Return SVG of a G that is under control: the goal moves while it is made, and an obstacle stands on its path."""
+    shown = kineme.load_lasa(["GShape"])[3]
+    primitive, obstacle = kineme.DMP().learn([shown]), np.array([[-27.0, 0.0]])
+    control = primitive.controller(
+        dt=0.005, avoidance=ObstacleAvoidance(gamma=4500, reach=10.0), end_velocity=[0.0, 0.0]
+    )
+    steps = 5 * round(1.8 * float(primitive.durations[0]) / 0.005 / 5)
+    turned = np.clip((np.arange(steps) / steps - 0.15) / 0.4, 0, 1)
+    goals = primitive.goals[0] + np.column_stack((24 * turned, -14 * np.sin(np.pi * turned)))
+    drifts = np.gradient(goals, 0.005, axis=0)
+    path = np.array(
+        [
+            control.step(goal=goal, goal_velocity=drift, obstacles=obstacle).position
+            for goal, drift in zip(goals, drifts, strict=True)
+        ]
+    )
+    frame = _Frame(110.0, (shown.positions.min(0) + shown.positions.max(0)) / 2, 3.1)
+    points, ends = frame.points(path), frame.points(goals)
+    frames = np.linspace(0, steps - 1, _FRAMES + 1).round().astype(int)
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    share = [f"{78 * k / _FRAMES:.3g}%" for k in range(_FRAMES + 1)]
+    rules = {
+        "pen": [f"{{stroke-dashoffset:{1 - length[k] / length[-1]:.3f}}}" for k in frames],
+        "tip": [_at(points[k]) for k in frames],
+        "goal": [_at(ends[k]) for k in frames],
+    }
+    moves = [
+        f"@keyframes {name}{{{''.join(map(str.__add__, share, steps))}100%{steps[-1]}}}"
+        f".{name}{{animation:{name} {_SECONDS}s linear -{0.9 * _SECONDS:.2g}s infinite}}"
+        for name, steps in rules.items()
+    ]
+    x, y = frame.points(obstacle)[0]
+    label = "A G is made again: it bends around an obstacle, and follows its goal, which moves meanwhile"
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 {_HEIGHT}" role="img" aria-label="{label}">',
+            f"<style>{_COLORS}.paper{{fill:var(--paper)}}path{{fill:none;stroke-linecap:round;stroke-linejoin:round}}"
+            ".gray{stroke:var(--soft);stroke-width:7;opacity:.35}.pen{stroke:var(--pen);stroke-width:4;"
+            "stroke-dasharray:1}.tip{fill:var(--tip)}.goal{fill:var(--moved)}.obstacle{fill:var(--soft)}"
+            f"{''.join(moves)}{_STILL}</style>",
+            f'<rect class="paper" width="520" height="{_HEIGHT}" rx="10"/>',
+            f'<path class="gray" d="{_d(frame.points(shown.positions[::10]))}"/>',
+            f'<circle class="obstacle" cx="{x:.1f}" cy="{y:.1f}" r="9"/>',
+            f'<path class="pen" pathLength="1" d="{_d(points[::5])}"/>',
+            '<circle class="goal" r="8"/><circle class="tip" r="6"/>',
+            "</svg>\n",
+        ]
+    )
+
+
+_STILL = "@media (prefers-reduced-motion:reduce){*{animation-play-state:paused!important}}"
+
+
 def _style() -> str:
     return (
         _COLORS + ".head{font:600 17px system-ui,sans-serif;text-anchor:middle;fill:var(--text)}"
@@ -128,8 +187,7 @@ def _style() -> str:
         + "".join(f".bar{k}{{animation:bar{k} {_TIME}}}" for k in range(3))
         + ".bar0{fill:var(--pen)}"
         f"@keyframes draw{{0%{{stroke-dashoffset:1}}{_percent(1)}{{stroke-dashoffset:0}}100%{{stroke-dashoffset:0}}}}"
-        "@media (prefers-reduced-motion:reduce)"
-        "{*{animation-play-state:paused!important}}"
+        + _STILL
     )
 
 

@@ -191,3 +191,23 @@ def test_the_first_picture_is_whole_when_it_begins():
     delays = re.findall(r"animation:\w+ 9.0s linear( -7.6s)? infinite", picture)
     assert len(delays) == 11
     assert all(delays)
+
+
+@pytest.mark.parametrize("name", ["kineme", "moving-goal"])
+def test_moving_pictures_are_small_and_look_right_in_the_dark_and_without_motion(name):
+    picture = (DOCS / "images" / f"{name}.svg").read_text(encoding="utf-8")
+    assert len(picture) < 20_000
+    assert "@media (prefers-color-scheme:dark){:root{--paper:none;" in picture
+    assert "@media (prefers-reduced-motion:reduce)" in picture
+    assert not re.search(r'fill="#', picture)  # colors that would stay as they are
+
+
+def test_a_movement_ends_at_the_goal_that_moved():
+    picture = (DOCS / "images" / "moving-goal.svg").read_text(encoding="utf-8")
+    places = {
+        name: [float(x) for x in re.findall(rf"@keyframes {name}{{.*?100%{{transform:translate\((.+?)px,", picture)]
+        for name in ("tip", "goal")
+    }
+    starts = re.findall(r"@keyframes goal{0%{transform:translate\((.+?)px,", picture)
+    assert abs(places["tip"][0] - places["goal"][0]) < 8
+    assert places["goal"][0] - float(starts[0]) > 50
