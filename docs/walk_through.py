@@ -51,17 +51,27 @@ def page_name(page: Path) -> str:
     return page.relative_to(DOCS.parent).as_posix()
 
 
+def pages_before(page: Path) -> list[Path]:
+    """Return the page that another one goes on from, in a list; an empty one for a page that begins by itself."""
+    return [page.parent / name for name in _AFTER.findall(page.read_text(encoding="utf-8"))]
+
+
+def text_from_the_beginning(page: Path) -> str:
+    """Return the text of a page, behind that of the pages which it goes on from."""
+    earlier = [text_from_the_beginning(before) for before in pages_before(page)]
+    return "\n".join([*earlier, _AFTER.sub("", page.read_text(encoding="utf-8"))])
+
+
 def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Iterator[Step]:
     """Run a page in an empty folder, step by step; `names` are what its Python defines.
 
     A page that says ``<!-- after: another.md -->`` is run after that one.
     """
     names = {} if names is None else names
-    written = page.read_text(encoding="utf-8")
-    for earlier in _AFTER.findall(written):
-        for _ in walk(page.parent / earlier, folder, names):
+    for earlier in pages_before(page):
+        for _ in walk(earlier, folder, names):
             pass
-    for kind, text in _BLOCK.findall(written):
+    for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
         if kind == "python" and any(text.startswith(f"import {package}\n") for package in _missing()):
             continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)

@@ -4,22 +4,17 @@ import re
 from pathlib import Path
 
 import pytest
-from walk_through import otherwise, walk
+from walk_through import otherwise, text_from_the_beginning, walk
 
 DOCS = Path(__file__).parents[1] / "docs"
-PARTS = [
-    DOCS / "tutorials" / f"action-library{part}.md" for part in ("", "-without-labels", "-in-python")
-]  # each after the one before
+TEXT = text_from_the_beginning(DOCS / "tutorials" / "action-library-in-python.md")  # three pages
 
 
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory):
     """The folder that the pages leave behind, and their steps; each is run once."""
     folder = tmp_path_factory.mktemp("tutorial")
-    text = "\n".join(
-        part.read_text(encoding="utf-8").partition(" -->\n")[2] or part.read_text("utf-8") for part in PARTS
-    )
-    (folder.parent / "tutorial.md").write_text(text, encoding="utf-8")
+    (folder.parent / "tutorial.md").write_text(TEXT, encoding="utf-8")
     return folder, list(walk(folder.parent / "tutorial.md", folder))
 
 
@@ -43,9 +38,7 @@ def test_every_answer_is_the_one_shown(walked):
 def test_every_picture_is_one_that_the_commands_draw(walked):
     """images/library-NAME.png is NAME.png of the walk; make figures copies them."""
     folder, _ = walked
-    pictures = re.findall(
-        r"\]\(\.\./images/library-(.+?)\.png\)", "".join(part.read_text(encoding="utf-8") for part in PARTS)
-    )
+    pictures = re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", TEXT)
     assert pictures
     for name in pictures:
         assert list(folder.rglob(f"{name}.png")), name
