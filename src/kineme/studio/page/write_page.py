@@ -20,7 +20,7 @@ _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", r
 _LEFT = re.compile(r"^(?:import|export)\b", re.MULTILINE)
 
 _FOLDER = Path(__file__).parent
-TOKENS = _FOLDER.parent / "web" / "tokens.css"
+_TOKENS = _FOLDER.parent / "web" / "tokens.css"
 _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly along z
 
 
@@ -35,13 +35,10 @@ def library_page(library: ActionLibrary, title: str, most: int | None = None) ->
     return page_of(snapshot, title), snapshot
 
 
-def page_of(snapshot: Snapshot, title: str, rules: str = "") -> str:
-    """Make the page of a snapshot; its content security policy allows its own script and style by hashes, no more.
-
-    `rules` are further rules of its style, as for a page that stands within another one.
-    """
+def page_of(snapshot: Snapshot, title: str) -> str:
+    """Make the page of a snapshot; its content security policy allows its own script and style by hashes, no more."""
     snapshot.header["view"] = view_of(snapshot)
-    style = TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8") + rules
+    style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
     parts = {
         "title": in_markup(title),
         "summary": in_markup(summary_of(snapshot)),
