@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from base64 import b64encode
+from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
@@ -16,23 +17,34 @@ from kineme.validation import Array
 
 _POINTS = 64  # of a thumbnail, at most
 
+#: Colors that drawings inside a page take, too; pictures of files keep white paper in the dark.
 _STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; max-width: 68rem;
+:root { color-scheme: light dark; --text: #1a1a1a; --soft: #444; --page: #fff; --raised: #f3f6f9; --line: #ddd;
+        --dot: #bbb; --blue: #0072b2; --orange: #d55e00; --purple: #cc79a7; --gray: #777; }
+@media (prefers-color-scheme: dark) {
+  :root { --text: #e8ecef; --soft: #b4bcc4; --page: #14181c; --raised: #1d2329; --line: #3a424a; --dot: #626c76;
+          --blue: #56b4e9; --orange: #f08a3c; --purple: #dc93ba; --gray: #8d969f; }
+}
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page); max-width: 68rem;
        margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; margin-bottom: .3rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
-p.lead { color: #444; margin-top: 0; max-width: 48rem; }
-figure { margin: 1.6rem 0; overflow-x: auto; } figcaption, figure p { color: #444; font-size: .9rem; max-width: 52rem; }
-img { max-width: 100%; height: auto; }
+.verdict { font-size: 1.15rem; max-width: 52rem; margin: .8rem 0; padding: .8rem 1.1rem; background: var(--raised);
+           border-left: 4px solid var(--blue); border-radius: 4px; }
+.verdict p { margin: .35rem 0; } .verdict p + p { font-size: 1rem; }
+p.lead { color: var(--soft); margin-top: 0; max-width: 48rem; }
+figure { margin: 1.6rem 0; overflow-x: auto; }
+figcaption, figure p { color: var(--soft); font-size: .9rem; max-width: 52rem; }
+img { max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
 table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; white-space: nowrap; font-weight: 600; padding-bottom: .4rem; font-size: .95rem; }
-th, td { padding: .28rem .7rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
-thead th { border-bottom: 1.5px solid #1a1a1a; } tbody th { font-weight: 500; }
+th, td { padding: .28rem .7rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
+thead th { border-bottom: 1.5px solid var(--text); } tbody th { font-weight: 500; }
 @media (max-width: 40rem) {
   caption { white-space: normal; max-width: calc(100vw - 2rem); }
   th, td { padding-right: .4rem; }
 }
-footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid #ddd; padding-top: 1rem; }
+footer { color: var(--soft); font-size: .85rem; margin-top: 3rem; padding-top: 1rem;
+         border-top: 1px solid var(--line); }
 """
 
 
@@ -90,13 +102,18 @@ def filled(template: str, parts: dict[str, str], style: str, scripts: dict[str, 
     return re.sub(r"\{\{(\w+)\}\}", lambda match: texts[match[1]], template)
 
 
-def page(title: str, heading: str, body: str, facts: dict[str, Any]) -> str:
-    """A whole HTML document: the title of the browser's tab, the heading above the body, and facts at its end."""
+def page(title: str, heading: str, verdict: Sequence[str], body: str, facts: dict[str, Any]) -> str:
+    """Return an HTML document: the title of the browser's tab, a heading, what to think of it all, and how it was made.
+
+    The sentences of `verdict` are paragraphs below the heading; the body should begin with a picture.
+    """
+    said = "".join(f"<p>{in_markup(sentence)}</p>" for sentence in verdict if sentence)
     listed = "; ".join(f"{in_markup(key)} {in_markup(value)}" for key, value in facts.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{in_markup(title)}</title><style>{_STYLE}</style></head><body>
 <h1>{in_markup(heading)}</h1>
+<div class="verdict">{said}</div>
 {body}
 <footer>{listed}</footer>
 </body></html>
