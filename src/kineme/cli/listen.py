@@ -1,0 +1,125 @@
+"""``kineme listen`` and ``kineme ros``: live sensors in, symbols out."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import click
+
+from kineme.cli.options import Finite, GroupedCommand, Parsed, given_options, heading, library_option, under
+from kineme.cli.output import write
+from kineme.reporting.text import printable
+
+_HEADS = Parsed("a,b,...", lambda text: [name.strip() for name in text.split(",")])
+
+
+def _place(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise ValueError(f"expected a host and a port, as 127.0.0.1:9001, got {text!r}")
+    return host.strip("[]"), int(port)
+
+
+#: Options of whatever listens.
+listening_options = under(
+    "Movements",
+    click.option("--columns", type=_HEADS, default=(), help="Columns of the stream in the order of the library's, by "
+                 "names or numbers from 0.  [default: by their names]"),
+    click.option("--rest", type=Finite(0.0, min_open=True), default=0.3, show_default=True,
+                 help="A movement is over when nothing has moved for so long [s]."),
+    click.option("--only-ended", is_flag=True, help="Say nothing of movements under way."),
+    click.option("--seconds", type=Finite(0.0, min_open=True), help="End after so long.  [default: with Ctrl-C]"),
+    click.option("--json", "as_json", is_flag=True, help="A line of JSON for each symbol."),
+)  # fmt: skip
+
+
+@click.command(cls=GroupedCommand, short_help="Name the movements of a live sensor, over LSL or OSC.")
+@library_option
+@click.option("--from", "source", type=click.Choice(["lsl", "osc"]), required=True, help="Where samples come from.")
+@click.option("--to", "sinks", type=click.Choice(["lsl", "osc"]), multiple=True,
+              help="Where symbols go besides this screen; may be repeated.")  # fmt: skip
+@listening_options
+@heading("LSL")
+@click.option("--name", help="Name of the stream.  [default: any with numbers]")
+@click.option("--type", "kind", help="Type of the stream, as MoCap.")
+@click.option("--names", is_flag=True, help="Markers are the names of ended movements.  [default: JSON of all]")
+@click.option("--lan", is_flag=True, help="Find, and be found by, other machines.  [default: this machine alone]")
+@heading("OSC")
+@click.option("--port", type=click.IntRange(1, 65535), default=9000, show_default=True, help="UDP port to listen at.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; OSC knows no passwords.")
+@click.option("--address", help="Address of the messages, as /hand.  [default: that of the first with numbers]")
+@click.option("--stamped", is_flag=True, help="The first number of a message is its time [s].")
+@click.option("--send-to", type=Parsed("host:port", _place), default="127.0.0.1:9001", show_default=True,
+              help="Where symbols go.")  # fmt: skip
+def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> None:
+    """Recognize movements while they are made: samples of a sensor in, names of symbols out.
+
+    A movement begins when the sensor moves and ends when it rests, or when no more samples come. Its name is said as
+    soon as it is decided, and again, with the unknown, when it is over. The library is only read; what others teach it
+    meanwhile is known from the next movement on. Extras: lsl, osc.
+
+    \b
+    kineme listen --library actions/ --from lsl --type MoCap --to lsl
+    kineme listen --library actions/ --from osc --address /hand --to osc --send-to 127.0.0.1:9001
+    """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.sensors.table import ADAPTERS
+
+    inward, outward = ADAPTERS[source], [(protocol, ADAPTERS[protocol]) for protocol in dict.fromkeys(sinks)]
+    used = {*inward.takes, *(name for _, adapter in outward for name in adapter.gives)}
+    every = {name for adapter in ADAPTERS.values() for name in (*adapter.takes, *adapter.gives)}
+    if useless := given_options(every - used):
+        raise click.UsageError(f"expected --from or --to with the protocol of {', '.join(useless)}")
+
+    def opened() -> tuple[Any, list[Any]]:
+        receivers = []
+        for protocol, adapter in outward:
+            given = {name: options[name] for name in adapter.gives}
+            receivers.append(adapter.sink(**given, same_clock=protocol == source))
+        return inward.source(**{name: options[name] for name in inward.takes}), receivers
+
+    _run(folder, options, opened)
+
+
+def _run(folder: Any, options: dict[str, Any], opened: Callable[[], tuple[Any, Sequence[Any]]]) -> None:
+    """Listen with a library until Ctrl-C, and say what it was."""
+    from kineme.library.library import ActionLibrary
+    from kineme.sensors.listen import Listener, listen, rests_of
+
+    def tell(sentence: str) -> None:
+        write(f"kineme: {printable(sentence)}", err=True)
+
+    with ActionLibrary(folder, read_only=True) as library:
+        listener = Listener(library, tell, rests_of(library, options["rest"]), options["columns"])
+        source, sinks = opened()
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        write("listening; stop it with Ctrl-C", err=True)
+        shown = _Screen(options["as_json"], options["only_ended"])
+        summary = listen(listener, source, [*sinks, shown], options["seconds"] or math.inf)
+    for line in summary.lines():
+        write(line, err=True)
+
+
+class _Screen:
+    """Standard output as a sink: a line for each symbol."""
+
+    def __init__(self, as_json: bool, only_ended: bool) -> None:
+        self._as_json, self._only_ended = as_json, only_ended
+
+    def send(self, symbol: Any) -> None:
+        """Print a symbol."""
+        if symbol.is_over or not self._only_ended:
+            write(json.dumps(symbol.to_dict()) if self._as_json else _in_words(symbol))
+
+    def close(self) -> None:
+        """Leave standard output open."""
+
+
+def _in_words(symbol: Any) -> str:
+    if not symbol.is_over:
+        return f"  {printable(symbol.name)}? ({symbol.confidence:.2f})"
+    seconds = f"{symbol.end - symbol.start:.1f} s"
+    return f"{printable(symbol.name)}  {symbol.certainty}, {symbol.confidence:.2f}, {seconds}"
