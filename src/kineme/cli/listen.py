@@ -6,6 +6,7 @@ import json
 import math
 import signal
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import click
@@ -74,7 +75,7 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     if useless := given_options(every - used):
         raise click.UsageError(f"expected --from or --to with the protocol of {', '.join(useless)}")
 
-    def opened() -> tuple[Any, list[Any]]:
+    def opened(_: Any) -> tuple[Any, list[Any]]:
         receivers = []
         for protocol, adapter in outward:
             given = {name: options[name] for name in adapter.gives}
@@ -84,7 +85,48 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     _run(folder, options, opened)
 
 
-def _run(folder: Any, options: dict[str, Any], opened: Callable[[], tuple[Any, Sequence[Any]]]) -> None:
+@click.command(cls=GroupedCommand, short_help="Name the movements of a topic of ROS 2; move an arm.")
+@library_option
+@click.option("--topic", help="Topic with samples, as /tip_pose: poses, joints, and what bags are read by.")
+@click.option("--frame", help="Two frames of /tf, as base:tip.")
+@listening_options
+@heading("Arm")
+@click.option("--execute", is_flag=True, help="Move an arm as the symbols whose names come on kineme/execute.")
+@click.option("--robot", help="panda, ur5e, wam, so101, or a .urdf file.")
+@click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
+@click.option("--action", default="/joint_trajectory_controller/follow_joint_trajectory", show_default=True,
+              help="Action of the controller.")  # fmt: skip
+def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> None:
+    """Recognize movements while they are made: a node of ROS 2 that publishes symbols on kineme/symbol, as JSON.
+
+    kineme/state holds the last one, also for nodes that come later. Without --execute nothing moves. With it the name
+    of a symbol on kineme/execute is planned from where /joint_states says that the arm stands, checked, and sent as a
+    FollowJointTrajectory; what became of it is on kineme/executed.
+
+    \b
+    kineme ros --library actions/ --topic /tip_pose
+    kineme ros --library actions/ --frame base:tip --execute --robot panda
+    """  # noqa: D301 - a backspace tells click to keep the lines
+    if options["execute"] != (options["robot"] is not None):
+        raise click.UsageError("expected --execute and --robot, or neither")
+
+    def opened(library: Any) -> tuple[Any, list[Any]]:
+        from kineme.sensors.ros import ArmClient, RosNode
+
+        node = RosNode(topic, frame)
+        if not options["execute"]:
+            return node, [node]
+        from kineme.planning.preview import plan_symbol
+        from kineme.robots.models.robot import load
+
+        robot = load(options["robot"], options["tip"])
+        plan = partial(plan_symbol, library, robot)
+        return node, [node, ArmClient(node, robot.joints, plan, options["action"])]
+
+    _run(folder, options, opened)
+
+
+def _run(folder: Any, options: dict[str, Any], opened: Callable[[Any], tuple[Any, Sequence[Any]]]) -> None:
     """Listen with a library until Ctrl-C, and say what it was."""
     from kineme.library.library import ActionLibrary
     from kineme.sensors.listen import Listener, listen, rests_of
@@ -94,7 +136,7 @@ def _run(folder: Any, options: dict[str, Any], opened: Callable[[], tuple[Any, S
 
     with ActionLibrary(folder, read_only=True) as library:
         listener = Listener(library, tell, rests_of(library, options["rest"]), options["columns"])
-        source, sinks = opened()
+        source, sinks = opened(library)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         write("listening; stop it with Ctrl-C", err=True)
         shown = _Screen(options["as_json"], options["only_ended"])

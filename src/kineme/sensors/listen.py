@@ -9,7 +9,7 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -20,7 +20,8 @@ from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
 from kineme.movements.channels.incremental import IncrementalCoordinates
-from kineme.recognition.answer import Certainty
+from kineme.movements.trajectories.labels import Label
+from kineme.recognition.answer import Answer, Certainty
 from kineme.reporting.text import counted, first_names, printable
 from kineme.sampling import evenly_spaced
 from kineme.validation import LARGEST, Array
@@ -191,8 +192,8 @@ class Listener:
         self._version = library.version
         example = library.movements(ids=library.ids()[:1])[0]
         self._live.update(example.times, example.recorded)
-        self._live.finish()  # code is loaded now, not when the first movement ends
-        self._live.reset()
+        self._live.remember(self._live.finish())  # code is loaded now, not when the first movement ends
+        self._live.reset(person=True)
         channels = self._live.channels
         n_dims = library.n_dims or 0
         self._wanted = None if channels is None else columns_recorded(channels)
@@ -201,8 +202,9 @@ class Listener:
         self._said: dict[str, float] = {}
         self._recent = np.empty((0, 1 + self._width + n_dims))  # of the last moments: stamp, row, coordinates
         self._began: float | None = None  # of the movement under way
-        self._decided: str | None = None
+        self._decided: Label | None = None
         self._pending: list[tuple[float, Array]] = []  # samples of it that the recognizer has not taken yet
+        self._answer: tuple[float, Answer] | None = None  # with its end, before it is sure that it is over
         self._stopped = False
         self._last_time, self._last_arrival = -math.inf, -math.inf
 
@@ -297,13 +299,26 @@ class Listener:
                     self._begin()
                 continue
             self._pending.append((t, rows[k]))
-            span = t - float(self._recent[0, 0])
-            if span >= self.rests.rest and extent <= self.rests.rests * self.rests.size:
-                yield from self._end(float(self._recent[0, 0]), t)
+            rested = self._rest()
+            if rested < 0.5 * self.rests.rest:
+                self._answer = None
+            elif self._answer is None:  # ahead, so that nobody waits for it once the rest is long enough
+                yield from self._update()
+                self._answer = self._recognized(t - rested)
+            if rested >= self.rests.rest:
+                yield from self._end(t - rested, t)
             elif t - self._began > self.rests.longest:
                 self.note("no rest", f"a movement is cut after {self.rests.longest:.1f} s; does the sensor tremble?")
                 yield from self._end(t, t)
         yield from self._update()
+
+    def _rest(self) -> float:
+        """Return for how long nothing has moved [s], and forget the samples before."""
+        back = self._recent[::-1, 1 + self._width :]
+        extents = (np.maximum.accumulate(back) - np.minimum.accumulate(back)).max(axis=1)
+        near = int((extents <= self.rests.rests * self.rests.size).sum())
+        self._recent = self._recent[len(back) - near :]
+        return float(self._recent[-1, 0] - self._recent[0, 0])
 
     def _remember(self, t: float, row: Array) -> float:
         """Keep a sample for as long as a rest takes, and return how far anything has moved since."""
@@ -334,31 +349,34 @@ class Listener:
         share = {guess.label: guess.confidence for guess in state.ranked}[state.label]
         yield Symbol(str(state.label), False, "looks like", share, self._began, state.arrival, times[-1])
 
+    def _recognized(self, end: float) -> tuple[float, Answer] | None:
+        """Return the end of the movement under way with the answer to it; None of fewer than four samples."""
+        try:
+            return end, self._live.finish(until=end)
+        except TrajectoryError:
+            return None
+
     def _end(self, end: float, decided: float) -> Iterator[Symbol]:
         """End the movement under way at a stamp, as is decided at another one [s], and yield its symbol."""
-        began = self._began
-        if began is None:
-            return
-        if self._pending and self._pending[0][0] <= end:  # later ones, of the rest, do not count
+        if self._answer is None or end - self._answer[0] > self.rests.rest:
             yield from self._update()
-        self._began = None
-        try:
-            answer = self._live.finish(until=end)
-        except TrajectoryError:
-            self._forget()
+            self._answer = self._recognized(end)
+        ended, began = self._answer, self._began
+        if ended is None or began is None:
             self.note("too short", "a movement of fewer than four samples is left out")
-            return
-        name = UNKNOWN if answer.label is None else str(answer.label)
-        self.summary.symbols[name] += 1
-        yield Symbol(name, True, answer.certainty, answer.confidence, began, end, decided)
-        self._live.remember(answer, end)
+        else:
+            end, answer = ended
+            name = UNKNOWN if answer.label is None else str(answer.label)
+            self.summary.symbols[name] += 1
+            yield Symbol(name, True, answer.certainty, answer.confidence, began, end, decided)
+            self._live.remember(answer, end)
         if self._version != self._library.version:
             self._live, self._version = self._library.stream(), self._library.version
         self._forget()
 
     def _forget(self) -> None:
         """Forget the movement under way and the samples before; the clock and the turns of angles begin anew."""
-        self._began, self._pending = None, []
+        self._began, self._pending, self._answer = None, [], None
         self._recent = self._recent[:0]
         if self._coordinates is not None:
             self._coordinates.clear()
@@ -371,8 +389,8 @@ def listen(listener: Listener, source: Source, sinks: Sequence[Sink], seconds: f
     """
     until = time.monotonic() + seconds
     with ExitStack() as stack:
-        for closed in (source, *sinks):
-            stack.enter_context(closing(closed))
+        for close in (source.close, *(sink.close for sink in sinks)):
+            stack.callback(close)
         try:
             while (left := until - time.monotonic()) > 0.0:
                 block, arrival = source.receive(min(_POLL, left)), time.monotonic()

@@ -88,7 +88,9 @@ class LslSource:
         self._inlet, self.columns = inlet, _columns(info)
         others = f", {len(streams) - 1} more would do" if len(streams) > 1 else ""
         rate = f" at {info.nominal_srate():g} samples per second" if info.nominal_srate() else ""
-        named = f"listening to {info.name()!r} of type {info.type()!r}, {', '.join(self.columns.heads[:12])}{rate}{others}"
+        named = (
+            f"listening to {info.name()!r} of type {info.type()!r}, {', '.join(self.columns.heads[:12])}{rate}{others}"
+        )
         return NOTHING._replace(notes=[("", named)])
 
     def close(self) -> None:

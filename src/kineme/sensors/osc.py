@@ -52,7 +52,9 @@ class OscSource:
             self._socket.bind((host, port))
         except OSError as error:
             self._socket.close()
-            raise DataError(f"expected the free UDP port {port} of {host}, got: {error}; choose another --port") from error
+            raise DataError(
+                f"expected the free UDP port {port} of {host}, got: {error}; choose another --port"
+            ) from error
 
     @property
     def port(self) -> int:
@@ -71,7 +73,7 @@ class OscSource:
                     for row in self._rows(datagram, notes):
                         times.append(row.pop(0) if self._stamped else now)
                         rows.append(row)
-                except Exception:  # noqa: BLE001 - whatever a parser raises on hostile bytes
+                except Exception:  # whatever a parser raises on hostile bytes
                     notes.append(("no OSC", f"a datagram of {len(datagram):,} bytes is left out"))
         return Block(np.array(times), np.array(rows), notes) if rows else NOTHING._replace(notes=notes)
 
