@@ -52,9 +52,7 @@ class OscSource:
             self._socket.bind((host, port))
         except OSError as error:
             self._socket.close()
-            raise DataError(
-                f"expected the free UDP port {port} of {host}, got: {error}; choose another --port"
-            ) from error
+            raise DataError(f"expected a free UDP port, {port} of {host} is not: {error}; choose --port") from error
 
     @property
     def port(self) -> int:

@@ -31,6 +31,7 @@ from kineme.validation import Array
 
 _WAITING = 1000  # messages that wait to be read
 _MOST_FRAMES = 10_000
+_FRESH = 1.0  # seconds for which the positions of joints count
 _CANCELED = 2.0  # seconds that the end of the node waits until an arm has been told to stop
 ACTION = "/joint_trajectory_controller/follow_joint_trajectory"  # that of ros2_control
 
@@ -148,7 +149,7 @@ class RosNode:
         def read(message: Any, is_static: bool = False) -> None:
             for transform in message.transforms:
                 if len(self._frames) < _MOST_FRAMES or edge_of(transform) in self._frames:
-                    self._frames[edge_of(transform)] = np.array(transform_row(transform))
+                    self._frames[edge_of(transform)] = np.array(transform_row(transform.transform))
             edges = {edge_of(transform): transform for transform in message.transforms}
             try:
                 way = chain(list(self._frames), *pair)
@@ -235,6 +236,7 @@ class ArmClient:
         states = ros_module("sensor_msgs.msg").JointState
         ros.node.create_subscription(states, "/joint_states", self._stand, 10)
         self._positions: Array | None = None
+        self._stood = 0.0  # when they were told
         self._goal: Any = None  # of the movement under way
         self._busy = False
 
@@ -242,6 +244,7 @@ class ArmClient:
         place = dict(zip(message.name, message.position, strict=False))
         if set(self._joints) <= place.keys():
             self._positions = np.array([place[joint] for joint in self._joints], dtype=float)
+            self._stood = time.monotonic()
 
     def _execute(self, message: Any) -> None:
         """Plan, check and send the movement of a name."""
@@ -249,7 +252,8 @@ class ArmClient:
         try:
             if self._busy:
                 raise SpecificationError("expected an arm at rest, a movement is under way")
-            if self._positions is None or not np.isfinite(self._positions).all():
+            is_old = time.monotonic() - self._stood > _FRESH
+            if is_old or self._positions is None or not np.isfinite(self._positions).all():
                 raise SpecificationError(f"expected positions of {', '.join(self._joints)} on /joint_states, got none")
             if not self._client.server_is_ready():
                 raise SpecificationError("expected a controller that offers the action, found none")
