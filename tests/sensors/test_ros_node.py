@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+
 from ros_programs import ros_2_with_kineme
 
 _BEGINNING = """
@@ -233,7 +234,7 @@ spin(node, lambda: canceled)
 first = goals[0].points
 node.close()
 library.close()
-print(json.dumps([[one for one in said if one["state"]], canceled, list(goals[0].joint_names), len(first),
+print(json.dumps([[answer for answer in said if answer["state"]], canceled, list(goals[0].joint_names), len(first),
                   first[0].positions.tolist(), robot.rest.tolist(), len(goals)]))
 executor.shutdown()
 """
@@ -244,7 +245,7 @@ def test_a_name_moves_the_arm_through_its_checks_and_the_end_of_the_node_cancels
     said, canceled, joints, n_points, first, rest, n_goals = _answer(
         _ARM, tmp_path / "actions", needs="control_msgs.action"
     )
-    states = [(one["name"], one["state"]) for one in said]
+    states = [(answer["name"], answer["state"]) for answer in said]
     assert states == [
         ("carry", "refused"), ("carry", "moving"), ("carry", "done"), ("nobody", "refused"), ("far", "refused"),
         ("carry", "moving"), ("carry", "failed"), ("carry", "moving"), ("carry", "refused"),

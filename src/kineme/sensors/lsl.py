@@ -61,7 +61,7 @@ class LslSource:
             return self._connect(timeout)
         try:
             rows, times = self._inlet.pull_chunk(timeout=timeout, min_samples=1, as_numpy=True)
-        except self._lsl.LostError:
+        except RuntimeError:  # all its errors are such
             self._inlet = None
             return NOTHING._replace(notes=[("stream lost", "looking for it again")])
         return Block(np.asarray(times, dtype=float), np.asarray(rows, dtype=float))
@@ -83,7 +83,7 @@ class LslSource:
             inlet.open_stream(timeout=_SYNCHRONIZED)
             inlet.time_correction(timeout=_SYNCHRONIZED)  # the first sample would wait for it
             info = inlet.info(timeout=_SYNCHRONIZED)
-        except RuntimeError:  # all its errors are such
+        except RuntimeError:
             return NOTHING._replace(notes=[("no stream", "the one that was there did not answer")])
         self._inlet, self.columns = inlet, _columns(info)
         others = f", {len(streams) - 1} more would do" if len(streams) > 1 else ""

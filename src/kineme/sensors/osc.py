@@ -46,6 +46,7 @@ class OscSource:
         with needs("python-osc", "read OSC", "osc"):
             import pythonosc.osc_packet  # noqa: F401
         self._address, self._stamped = address, stamped
+        self._opened = time.monotonic()  # stamps count from here: numbers of OSC have seven digits
         self.columns: Columns | None = None
         self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -66,7 +67,7 @@ class OscSource:
             for k in range(_MOST):
                 self._socket.settimeout(0.0 if k else timeout)
                 datagram = self._socket.recv(_LARGEST)
-                now = time.monotonic()
+                now = time.monotonic() - self._opened
                 try:
                     for row in self._rows(datagram, notes):
                         times.append(row.pop(0) if self._stamped else now)
@@ -105,7 +106,8 @@ class OscSource:
 class OscSink:
     """Symbols as messages to a UDP port: ``/kineme/symbol`` of movements that are over, ``/kineme/begins`` before.
 
-    Their arguments are the name, how sure it is in a word, the confidence, and start and end [s].
+    Their arguments are the name, how sure it is in a word, the confidence, and the stamps of start, of end and of the
+    sample that decided [s].
     """
 
     def __init__(self, send_to: tuple[str, int], same_clock: bool = False) -> None:
@@ -116,7 +118,7 @@ class OscSink:
     def send(self, symbol: Symbol) -> None:
         """Send a message; nobody need listen."""
         address = "/kineme/symbol" if symbol.is_over else "/kineme/begins"
-        seconds = [float(np.nan_to_num(value)) for value in (symbol.start, symbol.end)]
+        seconds = [float(np.nan_to_num(value)) for value in (symbol.start, symbol.end, symbol.time)]
         self._client.send_message(address, [symbol.name, symbol.certainty, float(symbol.confidence), *seconds])
 
     def close(self) -> None:

@@ -149,7 +149,7 @@ class RosNode:
         def read(message: Any, is_static: bool = False) -> None:
             for transform in message.transforms:
                 if len(self._frames) < _MOST_FRAMES or edge_of(transform) in self._frames:
-                    self._frames[edge_of(transform)] = np.array(transform_row(transform.transform))
+                    self._frames[edge_of(transform)] = np.array([transform_row(transform.transform)])
             edges = {edge_of(transform): transform for transform in message.transforms}
             try:
                 way = chain(list(self._frames), *pair)
@@ -159,15 +159,16 @@ class RosNode:
                 return
             stamps = [nanoseconds_of(edges[step.edge].header.stamp) for step in way if step.edge in edges]
             if stamps and not is_static:
-                p, q = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+                p, q = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
                 for step in way:
-                    values = self._frames[step.edge]
-                    x, r = values[:3], from_ros(values[3:])
+                    x = self._frames[step.edge][:, :3]
+                    with np.errstate(invalid="ignore"):  # of zeros, which are no rotation: the listener says so
+                        r = from_ros(self._frames[step.edge][:, 3:])
                     if not step.forward:
                         r = conjugate(r)
                         x = -rotated(r, x)
                     p, q = p + rotated(q, x), product(q, r)
-                self._samples.append((1e-9 * max(stamps), [*p.tolist(), *to_ros(q).tolist()]))
+                self._samples.append((1e-9 * max(stamps), [*p[0].tolist(), *to_ros(q)[0].tolist()]))
 
         self.node.create_subscription(message, "/tf", read, self._sensor)
         self.node.create_subscription(message, "/tf_static", lambda given: read(given, True), self._static)
