@@ -249,6 +249,8 @@ def test_it_ends_after_some_seconds(library):
 
 
 def test_a_summary_is_plain_words():
-    assert Summary(samples=1).lines() == ["1 sample, 0 movements"]
+    summary = Summary()
+    summary.samples = 1
+    assert summary.lines() == ["1 sample, 0 movements"]
     unfinished = Symbol("a", False, "looks like", 0.9, 0.0, math.nan, 1.0)
     assert unfinished.to_dict()["end"] is None

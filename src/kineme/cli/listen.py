@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -15,8 +15,6 @@ from kineme.cli.options import Finite, GroupedCommand, Parsed, given_options, he
 from kineme.cli.output import write
 from kineme.reporting.text import printable
 
-_HEADS = Parsed("a,b,...", lambda text: [name.strip() for name in text.split(",")])
-
 
 def _place(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
@@ -25,6 +23,8 @@ def _place(text: str) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
+_HEADS = Parsed("a,b,...", lambda text: tuple(name.strip() for name in text.split(",")))
+
 #: Options of whatever listens.
 listening_options = under(
     "Movements",
@@ -32,7 +32,7 @@ listening_options = under(
                  "names or numbers from 0.  [default: by their names]"),
     click.option("--rest", type=Finite(0.0, min_open=True), default=0.3, show_default=True,
                  help="A movement is over when nothing has moved for so long [s]."),
-    click.option("--only-ended", is_flag=True, help="Say nothing of movements under way."),
+    click.option("--only-ended", is_flag=True, help="Print nothing of movements under way."),
     click.option("--seconds", type=Finite(0.0, min_open=True), help="End after so long.  [default: with Ctrl-C]"),
     click.option("--json", "as_json", is_flag=True, help="A line of JSON for each symbol."),
 )  # fmt: skip
@@ -41,8 +41,7 @@ listening_options = under(
 @click.command(cls=GroupedCommand, short_help="Name the movements of a live sensor, over LSL or OSC.")
 @library_option
 @click.option("--from", "source", type=click.Choice(["lsl", "osc"]), required=True, help="Where samples come from.")
-@click.option("--to", "sinks", type=click.Choice(["lsl", "osc"]), multiple=True,
-              help="Where symbols go besides this screen; may be repeated.")  # fmt: skip
+@click.option("--to", "sinks", type=click.Choice(["lsl", "osc"]), multiple=True, help="Where symbols go, too.")
 @listening_options
 @heading("LSL")
 @click.option("--name", help="Name of the stream.  [default: any with numbers]")
@@ -69,18 +68,18 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.sensors.table import ADAPTERS
 
-    inward, outward = ADAPTERS[source], [(protocol, ADAPTERS[protocol]) for protocol in dict.fromkeys(sinks)]
-    used = {*inward.takes, *(name for _, adapter in outward for name in adapter.gives)}
+    inward, outward = ADAPTERS[source], {protocol: ADAPTERS[protocol] for protocol in sinks}
+    used = {*inward.takes, *(name for adapter in outward.values() for name in adapter.gives)}
     every = {name for adapter in ADAPTERS.values() for name in (*adapter.takes, *adapter.gives)}
     if useless := given_options(every - used):
         raise click.UsageError(f"expected --from or --to with the protocol of {', '.join(useless)}")
 
-    def opened(_: Any) -> tuple[Any, list[Any]]:
-        receivers = []
-        for protocol, adapter in outward:
-            given = {name: options[name] for name in adapter.gives}
-            receivers.append(adapter.sink(**given, same_clock=protocol == source))
-        return inward.source(**{name: options[name] for name in inward.takes}), receivers
+    def opened(_: Any) -> list[Any]:
+        receivers = [
+            adapter.sink(**{name: options[name] for name in adapter.gives}, same_clock=protocol == source)
+            for protocol, adapter in outward.items()
+        ]
+        return [inward.source(**{name: options[name] for name in inward.takes}), *receivers]
 
     _run(folder, options, opened)
 
@@ -109,40 +108,43 @@ def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> No
     """  # noqa: D301 - a backspace tells click to keep the lines
     if options["execute"] != (options["robot"] is not None):
         raise click.UsageError("expected --execute and --robot, or neither")
+    if (topic is None) == (frame is None):
+        raise click.UsageError("expected one of --topic and --frame")
 
-    def opened(library: Any) -> tuple[Any, list[Any]]:
+    def opened(library: Any) -> list[Any]:
+        from kineme.planning.preview import plan_symbol
+        from kineme.robots.models.robot import load
         from kineme.sensors.ros import ArmClient, RosNode
 
         node = RosNode(topic, frame)
         if not options["execute"]:
-            return node, [node]
-        from kineme.planning.preview import plan_symbol
-        from kineme.robots.models.robot import load
-
+            return [node, node]
         robot = load(options["robot"], options["tip"])
         plan = partial(plan_symbol, library, robot)
-        return node, [node, ArmClient(node, robot.joints, plan, options["action"])]
+        return [node, node, ArmClient(node, robot.joints, plan, options["action"])]
 
     _run(folder, options, opened)
 
 
-def _run(folder: Any, options: dict[str, Any], opened: Callable[[Any], tuple[Any, Sequence[Any]]]) -> None:
-    """Listen with a library until Ctrl-C, and say what it was."""
+def _run(folder: Any, options: dict[str, Any], opened: Callable[[Any], list[Any]]) -> None:
+    """Listen to the source that is opened first, with the sinks behind it, until Ctrl-C; say what it was."""
     from kineme.library.library import ActionLibrary
-    from kineme.sensors.listen import Listener, listen, rests_of
+    from kineme.sensors.listen import Listener, listen
 
     def tell(sentence: str) -> None:
         write(f"kineme: {printable(sentence)}", err=True)
 
     with ActionLibrary(folder, read_only=True) as library:
-        listener = Listener(library, tell, rests_of(library, options["rest"]), options["columns"])
-        source, sinks = opened(library)
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        write("listening; stop it with Ctrl-C", err=True)
-        shown = _Screen(options["as_json"], options["only_ended"])
-        summary = listen(listener, source, [*sinks, shown], options["seconds"] or math.inf)
-    for line in summary.lines():
-        write(line, err=True)
+        listener = Listener(library, tell, options["rest"], options["columns"])
+        source, *sinks = opened(library)
+        sinks.append(_Screen(options["as_json"], options["only_ended"]))
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
+        try:
+            write("listening; stop it with Ctrl-C", err=True)
+            summary = listen(listener, source, sinks, options["seconds"] or math.inf)
+        finally:
+            signal.signal(signal.SIGTERM, before)
+    write("\n".join(summary.lines()), err=True)
 
 
 class _Screen:
@@ -153,15 +155,13 @@ class _Screen:
 
     def send(self, symbol: Any) -> None:
         """Print a symbol."""
-        if symbol.is_over or not self._only_ended:
-            write(json.dumps(symbol.to_dict()) if self._as_json else _in_words(symbol))
+        name, seconds = printable(symbol.name), symbol.end - symbol.start
+        if self._as_json and (symbol.is_over or not self._only_ended):
+            write(json.dumps(symbol.to_dict()))
+        elif symbol.is_over:
+            write(f"{name}  {symbol.certainty}, {symbol.confidence:.2f}, {seconds:.1f} s")
+        elif not self._only_ended:
+            write(f"  {name}? ({symbol.confidence:.2f})")
 
     def close(self) -> None:
         """Leave standard output open."""
-
-
-def _in_words(symbol: Any) -> str:
-    if not symbol.is_over:
-        return f"  {printable(symbol.name)}? ({symbol.confidence:.2f})"
-    seconds = f"{symbol.end - symbol.start:.1f} s"
-    return f"{printable(symbol.name)}  {symbol.certainty}, {symbol.confidence:.2f}, {seconds}"

@@ -10,7 +10,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -36,14 +36,10 @@ _LATENCIES = 10_000  # that are remembered
 
 
 class Block(NamedTuple):
-    """Samples that came together: stamps (k,) [s], rows (k, m) of the source's columns, and what was wrong.
+    """Samples that came together, and what was wrong with others: a kind, by which it is counted, and a sentence."""
 
-    A row of another length than the columns is no row: the source says so in `notes`, pairs of a kind, by which they
-    are counted, and a sentence.
-    """
-
-    times: Array
-    rows: Array
+    times: Array  # (k,), stamps [s]
+    rows: Array  # (k, m), the columns of the source
     notes: Sequence[tuple[str, str]] = ()
 
 
@@ -56,41 +52,24 @@ class Source(Protocol):
     @property
     def columns(self) -> Columns | None:
         """Names and units of what it measures; None before it is there."""
-        ...
 
     def receive(self, timeout: float) -> Block:
         """Wait up to `timeout` seconds for samples, and return those that have come."""
-        ...
 
     def close(self) -> None:
         """Leave the stream."""
-        ...
 
 
 class Symbol(NamedTuple):
-    """A movement with a name: under way, when the name is decided, and again when it is over.
+    """A movement with a name: under way, when the name is decided, and again when it is over."""
 
-    Attributes
-    ----------
-    name : str
-        "unknown" if it is like no symbol.
-    is_over : bool
-    certainty : {"sure", "probably", "looks like", "new"}
-    confidence : float
-        As `Answer.confidence`; of a movement under way, the share of the evidence.
-    start, end : float
-        Stamps of its first and its last sample [s]; of a movement under way, `end` is when it is expected to end.
-    time : float
-        Stamp of the sample that decided [s].
-    """
-
-    name: str
+    name: str  # "unknown" if it is like no symbol
     is_over: bool
     certainty: Certainty
-    confidence: float
-    start: float
-    end: float
-    time: float
+    confidence: float  # as `Answer.confidence`; of a movement under way, the share of the evidence
+    start: float  # stamp of its first sample [s]
+    end: float  # of its last one; of a movement under way, when it is expected to end
+    time: float  # of the sample that decided
 
     def to_dict(self) -> dict[str, object]:
         """Return it as plain data that JSON can hold."""
@@ -102,37 +81,21 @@ class Sink(Protocol):
 
     def send(self, symbol: Symbol) -> None:
         """Hand a symbol on, without waiting for whoever reads it."""
-        ...
 
     def close(self) -> None:
         """Say no more."""
-        ...
 
 
 @dataclass(frozen=True)
 class Rests:
-    """Borders of movements in a stream.
+    """Borders of movements in a stream, by the extent of the largest coordinate in the time of a rest."""
 
-    Parameters
-    ----------
-    size : float
-        Extent of a usual movement, in the unit of its coordinates: the largest of any coordinate.
-    longest : float
-        Duration after which a movement ends although nothing rests [s].
-    rest : float, default 0.3
-        A movement is over when nothing has moved for so long [s].
-    silence : float, default 0.5
-        Or when no sample has come for so long [s].
-    sets_out, rests : float
-        Shares of the size: a movement begins when more is moved within `rest` seconds, and ends when less is.
-    """
-
-    size: float
-    longest: float
-    rest: float = 0.3
-    silence: float = 0.5
-    sets_out: float = 0.08
-    rests: float = 0.03
+    size: float  # extent of a usual movement
+    longest: float  # duration after which a movement ends although nothing rests [s]
+    rest: float = 0.3  # a movement is over when nothing has moved for so long [s]
+    silence: float = 0.5  # or when no sample has come for so long [s]
+    sets_out: float = 0.08  # share of the size that is moved where a movement begins
+    rests: float = 0.03  # and that is not moved where it ends
 
 
 def rests_of(library: ActionLibrary, rest: float = 0.3) -> Rests:
@@ -143,20 +106,21 @@ def rests_of(library: ActionLibrary, rest: float = 0.3) -> Rests:
     return Rests(size, _LONGEST * float(movements.durations.max()) + rest, rest)
 
 
-@dataclass
 class Summary:
     """Counts of what came and what was recognized, and seconds from each deciding sample to its symbol."""
 
-    samples: int = 0
-    symbols: Counter[str] = field(default_factory=Counter)  # of movements that are over
-    problems: Counter[str] = field(default_factory=Counter)  # kind -> how often
-    latencies: deque[float] = field(default_factory=lambda: deque(maxlen=_LATENCIES))
+    def __init__(self) -> None:
+        self.samples = 0
+        self.symbols: Counter[str] = Counter()  # of movements that are over
+        self.problems: Counter[str] = Counter()  # kind -> how often
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES)
 
     def lines(self) -> list[str]:
         """Return it in sentences."""
-        total = sum(self.symbols.values())
         names = ", ".join(f"{printable(name)} {count}" for name, count in self.symbols.most_common(20))
-        lines = [f"{counted(self.samples, 'sample')}, {counted(total, 'movement')}{f': {names}' if names else ''}"]
+        lines = [
+            f"{counted(self.samples, 'sample')}, {counted(self.symbols.total(), 'movement')}{names and ': '}{names}"
+        ]
         if self.latencies:
             median, worst = (1e3 * float(value) for value in np.quantile(self.latencies, (0.5, 1.0)))
             lines.append(f"from a sample to its symbol: {median:.1f} ms (median), {worst:.1f} ms at most")
@@ -166,30 +130,22 @@ class Summary:
 class Listener:
     """Find the movements in a stream by its rests, and name them by a library, while they come.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-        What others teach it meanwhile is known from the next movement on.
-    tell : callable
-        Takes a sentence about what went wrong; the same kind at most every five seconds.
-    rests : Rests, optional
-        By default `rests_of` the library.
-    choose : sequence of str
-        Columns of the stream, by names or numbers from 0, in the order of the library's; by default by their names.
+    `tell` takes sentences about what went wrong, the same kind at most every five seconds. `choose`: columns of the
+    stream, by names or numbers from 0, in the order of the library's; by default by their names. What others teach the
+    library meanwhile is known from the next movement on.
     """
 
     def __init__(
         self,
         library: ActionLibrary,
         tell: Callable[[str], None],
-        rests: Rests | None = None,
+        rest: float = 0.3,
         choose: Sequence[str] = (),
     ) -> None:
         self._library, self._tell, self._choose = library, tell, choose
-        self.rests = rests_of(library) if rests is None else rests
         self.summary = Summary()
-        self._live = library.stream()
-        self._version = library.version
+        self._live, self._version = library.stream(), library.version
+        self.rests = rests_of(library, rest)
         example = library.movements(ids=library.ids()[:1])[0]
         self._live.update(example.times, example.recorded)
         self._live.remember(self._live.finish())  # code is loaded now, not when the first movement ends

@@ -30,22 +30,9 @@ def _load(lan: bool) -> Any:
 
 
 class LslSource:
-    """Samples of the first stream of a name or a type.
+    """Samples of the first stream of a name or a type, looked for until it is there, and again when it has gone.
 
-    Stamps are those of the sender, in the clock of this machine. A stream that is not there yet, or that has gone, is
-    looked for.
-
-    Parameters
-    ----------
-    name, kind : str, optional
-        Name and type of the stream, as "MoCap"; by default any with numbers.
-    lan : bool
-        Whether other machines are asked, too.
-
-    Raises
-    ------
-    DataError
-        The package pylsl is not installed.
+    Stamps are those of the sender, in the clock of this machine. With `lan`, other machines are asked, too.
     """
 
     def __init__(self, name: str | None = None, kind: str | None = None, lan: bool = False) -> None:
@@ -68,12 +55,10 @@ class LslSource:
 
     def _connect(self, timeout: float) -> Block:
         streams = [
-            info
-            for info in self._streams.results()
-            if info.channel_format() != _TEXT
-            and info.channel_count() <= _MOST_CHANNELS
+            info for info in self._streams.results()
+            if info.channel_format() != _TEXT and info.channel_count() <= _MOST_CHANNELS
             and all(getattr(info, key)() == value for key, value in self._wanted.items())
-        ]
+        ]  # fmt: skip
         if not streams:
             time.sleep(timeout)
             wanted = " and ".join(f"{key} {value!r}" for key, value in self._wanted.items()) or "numbers"

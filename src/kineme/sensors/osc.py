@@ -25,21 +25,10 @@ _MOST_VALUES = 1000  # of a sample
 
 
 class OscSource:
-    """Samples from messages to one address, as ``/hand 0.1 0.2 0.3``.
+    """Samples from messages to one address, as ``/hand 0.1 0.2 0.3``, by default that of the first with numbers.
 
-    Parameters
-    ----------
-    port, host : int, str
-        UDP port to listen at, by default of this machine alone.
-    address : str, optional
-        By default that of the first message with numbers.
-    stamped : bool
-        Whether the first number of a message is its time [s]; by default samples have the time at which they come.
-
-    Raises
-    ------
-    DataError
-        The package python-osc is not installed, or the port is taken.
+    `stamped`: the first number of a message is its time [s]; else samples have the time at which they come. A
+    `DataError` says that python-osc is not installed, or that the port is taken.
     """
 
     def __init__(self, port: int = PORT, host: str = LOOPBACK, address: str | None = None, stamped: bool = False):

@@ -37,27 +37,13 @@ ACTION = "/joint_trajectory_controller/follow_joint_trajectory"  # that of ros2_
 
 
 class RosNode:
-    """A node named "kineme": a source of samples, and a sink that publishes symbols.
+    """A node named "kineme": a source of samples of a topic or of two frames, and a sink that publishes symbols.
 
     ``kineme/symbol`` has each symbol as JSON in a std_msgs/String; ``kineme/state`` the last one, also for nodes that
-    come later.
-
-    Parameters
-    ----------
-    topic : str, optional
-        Topic with samples; its type is found when somebody publishes it.
-    frame : str, optional
-        Or a pose of /tf, as "base:tip".
-
-    Raises
-    ------
-    DataError
-        rclpy or the messages are not installed, or not one of topic and frame is given.
+    come later. The type of a topic is found when somebody publishes it. A `DataError` says what is not installed.
     """
 
     def __init__(self, topic: str | None = None, frame: str | None = None) -> None:
-        if (topic is None) == (frame is None):
-            raise DataError("expected a topic or two frames, as --topic /tip_pose or --frame base:tip")
         rclpy, self._strings = ros_module("rclpy"), ros_module("std_msgs.msg")
         os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # nobody else on the network
         qos = ros_module("rclpy.qos")
@@ -210,18 +196,9 @@ def ros_module(name: str) -> Any:
 class ArmClient:
     """A client of an action FollowJointTrajectory: executes a symbol when its name comes on ``kineme/execute``.
 
-    What is sent comes from `plan`, which checks it: a name and where the joints stand now, to a movement. One movement
-    at a time; what became of it is said on ``kineme/executed``. When the node ends, a movement under way is canceled.
-
-    Parameters
-    ----------
-    ros : RosNode
-    joints : sequence of str
-        Joints whose positions ``/joint_states`` has to tell.
-    plan : callable
-        ``plan(name, positions)``; a `KinemeError` refuses.
-    action : str
-        Name of the action.
+    ``plan(name, positions)`` makes it a movement from where ``/joint_states`` says that the joints stand; a
+    `KinemeError` refuses, and so do checks that fail. One movement at a time; what became of it is said on
+    ``kineme/executed``. When the node ends, a movement under way is canceled.
     """
 
     def __init__(
