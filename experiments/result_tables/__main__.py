@@ -16,10 +16,11 @@ from result_tables import large_archives, motion_layer, planning
 from result_tables import modulation as modulation_tables
 from result_tables import outliers as outlier_tables
 from result_tables import people as people_tables
+from result_tables import sensors as sensor_tables
 from result_tables.measured import DOCS, RESULTS, figures, fill, rows, table
 
 #: Pages of the guide besides that one about recognition.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables, large_archives)
+GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables, large_archives, sensor_tables)
 PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {

@@ -7,6 +7,7 @@ table that bags are read by, `kineme.io.ros.number_fields`.
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from collections import deque
@@ -18,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError, KinemeError, SpecificationError
-from kineme.io.ros.choose import Edge, chain, edge_of, pair_of
+from kineme.io.ros.choose import Edge, Step, chain, edge_of, pair_of
 from kineme.io.ros.number_fields import POSE, TRANSFORMS, TYPES, MessageType, nanoseconds_of, transform_row
 from kineme.io.ros.streams import from_ros, to_ros
 from kineme.movements.channels.column_match import Columns
 from kineme.movements.rotations import conjugate, product, rotated
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-from kineme.robots.export_files import samples_of, stamp_of
+from kineme.robots.export_files import TRAJECTORY, samples_of, stamp_of
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.sensors.listen import NOTHING, Block, Symbol
 from kineme.validation import Array
@@ -33,6 +34,7 @@ _WAITING = 1000  # messages that wait to be read
 _MOST_FRAMES = 10_000
 _FRESH = 1.0  # seconds for which the positions of joints count
 _CANCELED = 2.0  # seconds that the end of the node waits until an arm has been told to stop
+_STRING = "std_msgs/msg/String"
 ACTION = "/joint_trajectory_controller/follow_joint_trajectory"  # that of ros2_control
 
 
@@ -44,25 +46,23 @@ class RosNode:
     """
 
     def __init__(self, topic: str | None = None, frame: str | None = None) -> None:
-        rclpy, self._strings = ros_module("rclpy"), ros_module("std_msgs.msg")
+        rclpy, self._text = ros_module("rclpy"), _message_type(_STRING)
         os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # nobody else on the network
-        qos = ros_module("rclpy.qos")
+        self._qos = qos = ros_module("rclpy.qos")
         signals = ros_module("rclpy.signals").SignalHandlerOptions.NO  # Ctrl-C ends the loop, which ends the node
         self._context = rclpy.Context()
         rclpy.init(context=self._context, signal_handler_options=signals)
         self.node = rclpy.create_node("kineme", context=self._context)
-        self._executor = ros_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
+        self.executor = ros_module("rclpy.executors").SingleThreadedExecutor(context=self._context)
+        self.executor.add_node(self.node)
         latched = qos.QoSProfile(depth=1, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
-        self._symbols = self.node.create_publisher(self._strings.String, "kineme/symbol", 10)
-        self._state = self.node.create_publisher(self._strings.String, "kineme/state", latched)
+        self._symbols = self.node.create_publisher(self._text, "kineme/symbol", 10)
+        self._state = self.node.create_publisher(self._text, "kineme/state", latched)
         self._sensor = qos.QoSProfile(depth=_WAITING, reliability=qos.ReliabilityPolicy.BEST_EFFORT)
-        self._static = qos.QoSProfile(depth=_WAITING, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
         self.columns: Columns | None = None
         self._topic = topic
-        self._frames: dict[Edge, Array] = {}  # the latest transforms
         self._samples: deque[tuple[float, list[float]]] = deque(maxlen=_WAITING)
-        self._notes: list[tuple[str, str]] = []
+        self.notes: list[tuple[str, str]] = []  # what is said with the next samples
         if frame is not None:
             self._subscribe_frames(pair_of(frame))
 
@@ -70,13 +70,13 @@ class RosNode:
         """Let the node work until a sample comes, and return those that are there."""
         if self._topic is not None and self.columns is None:
             self._subscribe(self._topic)
-        self._executor.spin_once(timeout_sec=timeout)
+        self.executor.spin_once(timeout_sec=timeout)
         for _ in range(len(self._samples) and _WAITING):
             count = len(self._samples)
-            self._executor.spin_once(timeout_sec=0.0)
+            self.executor.spin_once(timeout_sec=0.0)
             if len(self._samples) == count:
                 break
-        notes, self._notes = self._notes, []
+        notes, self.notes = self.notes, []
         if not self._samples:
             return NOTHING._replace(notes=notes)
         times, rows = zip(*self._samples, strict=True)
@@ -92,93 +92,85 @@ class RosNode:
                 readable = ", ".join(other for other, how in TYPES.items() if how.row is not None)
                 raise DataError(f"expected a topic with samples, {name} has {kind}; these are read: {readable}")
             self._topic = None
-            message = getattr(ros_module(kind.rpartition("/")[0].replace("/", ".")), kind.rpartition("/")[2])
-            self.node.create_subscription(message, name, self._reader(how), self._sensor)
-            self._notes.append(("", f"listening to {name}, {kind}"))
+            self.node.create_subscription(_message_type(kind), name, self._reader(how), self._sensor)
+            self.notes.append(("", f"listening to {name}, {kind}"))
             return
-        self._notes.append(("no topic", f"waiting for somebody who publishes {name}"))
+        self.notes.append(("no topic", f"waiting for somebody who publishes {name}"))
 
     def _reader(self, how: MessageType) -> Callable[[Any], None]:
-        row = how.row
-        if row is None:
-            raise SpecificationError("expected a type whose messages are samples")
+        """Return what reads a message of a type."""
 
         def read(message: Any) -> None:
             try:
-                heads, values = row(message)
+                heads, values = how.row(message) if how.row else ((), ())
             except ValueError as error:
-                self._notes.append(("no sample", f"{error}"))
+                self.notes.append(("no sample", f"{error}"))
                 return
-            if not heads:
-                return
-            stamp = nanoseconds_of(message.header.stamp) if how.has_header else 0
-            if self.columns is None:
+            if self.columns is None and heads:
                 self.columns = Columns(tuple(heads), (None,) * len(heads))
-            elif tuple(heads) != self.columns.heads:
-                place = dict(zip(heads, values, strict=True))
-                if not set(self.columns.heads) <= place.keys():
-                    self._notes.append(
-                        ("other values", f"expected {', '.join(self.columns.heads[:12])} in each message")
-                    )
-                    return
-                values = [place[head] for head in self.columns.heads]
-            self._samples.append((1e-9 * stamp if stamp else time.monotonic(), list(values)))
+            wanted, place = self.columns.heads if self.columns else (), dict(zip(heads, values, strict=True))
+            if heads and set(wanted) <= place.keys():
+                stamp = nanoseconds_of(message.header.stamp) if how.has_header else 0
+                self._samples.append((1e-9 * stamp if stamp else time.monotonic(), [place[head] for head in wanted]))
+            elif heads:
+                self.notes.append(("other values", f"expected {', '.join(wanted[:12])} in each message"))
 
         return read
 
     def _subscribe_frames(self, pair: Edge) -> None:
         """Follow the pose of one frame in another: at each transform of /tf on the way between them."""
-        kind = TRANSFORMS[0].rpartition("/")
-        message = getattr(ros_module(kind[0].replace("/", ".")), kind[2])
+        message, frames, way = _message_type(TRANSFORMS[0]), dict[Edge, Array](), list[Step]()
         self.columns = Columns(POSE, (None,) * len(POSE))
 
         def read(message: Any, is_static: bool = False) -> None:
-            for transform in message.transforms:
-                if len(self._frames) < _MOST_FRAMES or edge_of(transform) in self._frames:
-                    self._frames[edge_of(transform)] = np.array([transform_row(transform.transform)])
-            edges = {edge_of(transform): transform for transform in message.transforms}
-            try:
-                way = chain(list(self._frames), *pair)
-            except DataError as error:
-                if not is_static:
-                    self._notes.append(("no frame", f"{error}"))
-                return
-            stamps = [nanoseconds_of(edges[step.edge].header.stamp) for step in way if step.edge in edges]
-            if stamps and not is_static:
-                p, q = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
-                for step in way:
-                    x = self._frames[step.edge][:, :3]
-                    with np.errstate(invalid="ignore"):  # of zeros, which are no rotation: the listener says so
-                        r = from_ros(self._frames[step.edge][:, 3:])
-                    if not step.forward:
-                        r = conjugate(r)
-                        x = -rotated(r, x)
-                    p, q = p + rotated(q, x), product(q, r)
-                self._samples.append((1e-9 * max(stamps), [*p[0].tolist(), *to_ros(q)[0].tolist()]))
+            stamps = {edge_of(transform): nanoseconds_of(transform.header.stamp) for transform in message.transforms}
+            is_new = bool(stamps.keys() - frames.keys())
+            for transform in message.transforms[: _MOST_FRAMES - len(frames) if is_new else None]:
+                frames[edge_of(transform)] = np.array([transform_row(transform.transform)])
+            if is_new:
+                try:
+                    way[:] = chain(list(frames), *pair)
+                except DataError as error:
+                    self.notes.append(("no frame", f"{error}"))
+            moved = [stamps[step.edge] for step in way if step.edge in stamps]
+            if moved and not is_static:
+                self._samples.append((1e-9 * max(moved), _pose_along(way, frames)))
 
         self.node.create_subscription(message, "/tf", read, self._sensor)
-        self.node.create_subscription(message, "/tf_static", lambda given: read(given, True), self._static)
+        static = self._qos.QoSProfile(depth=_WAITING, durability=self._qos.DurabilityPolicy.TRANSIENT_LOCAL)
+        self.node.create_subscription(message, "/tf_static", lambda message: read(message, True), static)
 
     def send(self, symbol: Symbol) -> None:
         """Publish a symbol."""
-        message = self._strings.String(data=json.dumps(symbol.to_dict()))
+        message = self._text(data=json.dumps(symbol.to_dict()))
         self._symbols.publish(message)
         self._state.publish(message)
 
-    def spin_until(self, future: Any, seconds: float) -> None:
-        """Let the node work until something is done, or time is over."""
-        self._executor.spin_until_future_complete(future, seconds)
-
-    def tell(self, kind: str, sentence: str) -> None:
-        """Say something with the next samples; an empty kind is news."""
-        self._notes.append((kind, sentence))
-
     def close(self) -> None:
         """End the node."""
-        self._executor.shutdown()
+        self.executor.shutdown()
         self.node.destroy_node()
         with suppress(RuntimeError):
             self._context.shutdown()
+
+
+def _pose_along(way: list[Step], frames: dict[Edge, Array]) -> list[float]:
+    """Return the pose of the frame at the end of a way, in the one at its beginning."""
+    p, q = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
+    for step in way:
+        x = frames[step.edge][:, :3]
+        with np.errstate(invalid="ignore"):  # of zeros, which are no rotation: the listener says so
+            r = from_ros(frames[step.edge][:, 3:])
+        if not step.forward:
+            r = conjugate(r)
+            x = -rotated(r, x)
+        p, q = p + rotated(q, x), product(q, r)
+    return [*p[0].tolist(), *to_ros(q)[0].tolist()]
+
+
+def _message_type(kind: str) -> Any:
+    package, _, name = kind.rpartition("/")
+    return getattr(ros_module(package.replace("/", ".")), name)
 
 
 def ros_module(name: str) -> Any:
@@ -205,33 +197,26 @@ class ArmClient:
         self, ros: RosNode, joints: tuple[str, ...], plan: Callable[[str, Array], RobotMovement], action: str = ACTION
     ) -> None:
         self._ros, self._joints, self._plan = ros, joints, plan
-        self._messages, self._points = ros_module("control_msgs.action"), ros_module("trajectory_msgs.msg")
-        self._durations, self._strings = ros_module("builtin_interfaces.msg"), ros_module("std_msgs.msg")
-        follow = self._messages.FollowJointTrajectory
-        self._client = ros_module("rclpy.action").ActionClient(ros.node, follow, action)
-        self._executed = ros.node.create_publisher(self._strings.String, "kineme/executed", 10)
-        ros.node.create_subscription(self._strings.String, "kineme/execute", self._execute, 10)
-        states = ros_module("sensor_msgs.msg").JointState
-        ros.node.create_subscription(states, "/joint_states", self._stand, 10)
-        self._positions: Array | None = None
-        self._stood = 0.0  # when they were told
-        self._goal: Any = None  # of the movement under way
-        self._busy = False
+        self._action, self._text = ros_module("control_msgs.action").FollowJointTrajectory, _message_type(_STRING)
+        self._client = ros_module("rclpy.action").ActionClient(ros.node, self._action, action)
+        self._executed = ros.node.create_publisher(self._text, "kineme/executed", 10)
+        ros.node.create_subscription(self._text, "kineme/execute", self._execute, 10)
+        ros.node.create_subscription(_message_type("sensor_msgs/msg/JointState"), "/joint_states", self._stand, 10)
+        self._positions, self._stood = np.full(len(joints), np.nan), -math.inf  # and when they were told
+        self._sent: Any = None  # of the movement under way: the future of the answer of the controller
 
     def _stand(self, message: Any) -> None:
         place = dict(zip(message.name, message.position, strict=False))
         if set(self._joints) <= place.keys():
-            self._positions = np.array([place[joint] for joint in self._joints], dtype=float)
-            self._stood = time.monotonic()
+            self._positions, self._stood = np.array([place[joint] for joint in self._joints]), time.monotonic()
 
     def _execute(self, message: Any) -> None:
         """Plan, check and send the movement of a name."""
         name = message.data
         try:
-            if self._busy:
+            if self._sent is not None:
                 raise SpecificationError("expected an arm at rest, a movement is under way")
-            is_old = time.monotonic() - self._stood > _FRESH
-            if is_old or self._positions is None or not np.isfinite(self._positions).all():
+            if time.monotonic() - self._stood > _FRESH or not np.isfinite(self._positions).all():
                 raise SpecificationError(f"expected positions of {', '.join(self._joints)} on /joint_states, got none")
             if not self._client.server_is_ready():
                 raise SpecificationError("expected a controller that offers the action, found none")
@@ -241,46 +226,46 @@ class ArmClient:
         except KinemeError as error:
             self._tell(name, "refused", str(error))
             return
-        self._busy = True
-        goal = self._messages.FollowJointTrajectory.Goal(trajectory=self._message(movement.trajectory))
-        self._client.send_goal_async(goal).add_done_callback(lambda future: self._accepted(name, future.result()))
-
-    def _message(self, trajectory: JointTrajectory) -> Any:
-        points = [
-            self._points.JointTrajectoryPoint(
-                positions=positions.tolist(),
-                velocities=velocities.tolist(),
-                accelerations=accelerations.tolist(),
-                time_from_start=self._durations.Duration(**stamp_of(seconds)),
-            )
-            for seconds, positions, velocities, accelerations in samples_of(trajectory)
-        ]
-        return self._points.JointTrajectory(joint_names=list(trajectory.joints), points=points)
+        self._sent = self._client.send_goal_async(self._action.Goal(trajectory=_message_of(movement.trajectory)))
+        self._sent.add_done_callback(lambda future: self._accepted(name, future.result()))
 
     def _accepted(self, name: str, goal: Any) -> None:
-        if not goal.accepted:
-            self._busy = False
+        if goal.accepted:
+            self._tell(name, "moving")
+            goal.get_result_async().add_done_callback(lambda future: self._done(name, future.result()))
+        else:
+            self._sent = None
             self._tell(name, "refused", "by the controller")
-            return
-        self._goal = goal
-        self._tell(name, "moving", "")
-        goal.get_result_async().add_done_callback(lambda future: self._done(name, future.result()))
 
     def _done(self, name: str, ended: Any) -> None:
-        self._goal, self._busy = None, False
-        code, words = ended.result.error_code, ended.result.error_string
-        is_done = ended.status == ros_module("action_msgs.msg").GoalStatus.STATUS_SUCCEEDED and not code
-        self._tell(name, "done" if is_done else "failed", words or ("" if is_done else f"error {code}"))
+        self._sent = None
+        code = ended.result.error_code
+        is_done = ended.status == _message_type("action_msgs/msg/GoalStatus").STATUS_SUCCEEDED and not code
+        self._tell(
+            name, "done" if is_done else "failed", ended.result.error_string or (f"error {code}" if code else "")
+        )
 
-    def _tell(self, name: str, state: str, reason: str) -> None:
-        data = {"name": name, "state": state, "reason": reason}
-        self._executed.publish(self._strings.String(data=json.dumps(data)))
-        self._ros.tell("", f"execute {name!r}: {state}{f', {reason}' if reason else ''}")
+    def _tell(self, name: str, state: str, reason: str = "") -> None:
+        self._executed.publish(self._text(data=json.dumps({"name": name, "state": state, "reason": reason})))
+        self._ros.notes.append(("", f"execute {name!r}: {state}{reason and ', '}{reason}"))
 
     def send(self, symbol: Symbol) -> None:
         """Move nothing: what a person shows is no order."""
 
     def close(self) -> None:
-        """Cancel a movement that is under way."""
-        if self._goal is not None:
-            self._ros.spin_until(self._goal.cancel_goal_async(), _CANCELED)
+        """Cancel a movement that is under way, or about to be accepted."""
+        if (sent := self._sent) is not None:
+            self._ros.executor.spin_until_future_complete(sent, _CANCELED)
+            if sent.done() and sent.result().accepted:
+                self._ros.executor.spin_until_future_complete(sent.result().cancel_goal_async(), _CANCELED)
+
+
+def _message_of(trajectory: JointTrajectory) -> Any:
+    """Return a trajectory_msgs/JointTrajectory whose time stamp 0 controllers take as now."""
+    duration, point = _message_type("builtin_interfaces/msg/Duration"), _message_type(f"{TRAJECTORY}Point")
+    names = ("positions", "velocities", "accelerations")
+    points = [
+        point(**dict(zip(names, map(np.ndarray.tolist, values), strict=True)), time_from_start=duration(**stamp_of(t)))
+        for t, *values in samples_of(trajectory)
+    ]
+    return _message_type(TRAJECTORY)(joint_names=list(trajectory.joints), points=points)
