@@ -1,6 +1,6 @@
 """The other side of `bench.sensors`: sends the samples of a file at 100 Hz, and prints when each symbol arrived.
 
-It runs in the Python of the protocol, which need not have kineme: ``sensor_client.py lsl samples.npy port port``.
+It runs in the Python of the protocol, which need not have kineme: ``sensor_client.py lsl samples.npy port port pid``.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ Push = Callable[[list[float], int], float]
 Heard = Callable[[float, float], None]  # the stamp that a symbol names, and when it arrived
 
 
-def lsl(_: list[int], heard: Heard) -> Push:
+def lsl(numbers: list[int], heard: Heard) -> Push:
     import pylsl
 
     pylsl.set_config_content("[log]\nlevel = -3\n[multicast]\nResolveScope = machine\nListenAddress = 127.0.0.1\n")
     outlet = pylsl.StreamOutlet(pylsl.StreamInfo("bench", "MoCap", 2, RATE, pylsl.cf_double64, "bench"))
-    markers = pylsl.StreamInlet(pylsl.resolve_bypred("type='Markers' and name='kineme'", timeout=60)[0])
+    markers = pylsl.StreamInlet(pylsl.resolve_bypred(f"source_id='kineme-{numbers[2]}'", timeout=60)[0])
     markers.open_stream(timeout=60)
     outlet.wait_for_consumers(60)
     time.sleep(2.0)  # clocks are compared

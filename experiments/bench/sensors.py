@@ -36,7 +36,7 @@ def measure(quick: bool) -> list[Row]:
         demos = kineme.load_lasa(NAMES)
         with kineme.ActionLibrary(folder, create=True) as library:
             library.learn(demos[[k for k in range(len(demos)) if k % 7 < OF_EACH]])
-        takes = range(OF_EACH, OF_EACH + (1 if quick else 3))
+        takes = range(OF_EACH, OF_EACH + (1 if quick else 2))
         np.save(samples, np.concatenate([_between_rests(demos[7 * c + k]) for k in takes for c in range(len(NAMES))]))
         for protocol, module in (("lsl", "pylsl"), ("osc", "pythonosc"), ("ros", "rclpy")):
             python = _python_with(module, protocol == "ros")
@@ -98,10 +98,10 @@ def _latencies(protocol: str, python: str, folder: Path, samples: Path) -> list[
         for line in listening.stderr:
             if line.startswith("listening"):
                 break
-        client = [python, str(_CLIENT), protocol, str(samples), *map(str, ports)]
+        client = [python, str(_CLIENT), protocol, str(samples), *map(str, (*ports, listening.pid))]
         done = subprocess.run(client, env=_environment(), capture_output=True, text=True, timeout=900, check=True)
     finally:
-        listening.send_signal(signal.SIGINT)
+        listening.send_signal(signal.SIGTERM)  # as Ctrl-C, which background processes ignore
         print(f"{protocol}: " + " | ".join(listening.communicate(timeout=60)[1].strip().splitlines()[-4:]))
     taken: list[float] = json.loads(done.stdout)
     return taken

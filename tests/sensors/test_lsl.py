@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
+import sys
 import time
 import uuid
 
@@ -130,3 +133,32 @@ def test_markers_may_be_the_names_of_ended_movements_alone():
     sink.send(Symbol("größer", True, "sure", 1.0, 1.0, 2.0, 2.3))
     assert markers.pull_sample(timeout=10)[0] == ["größer"]
     sink.close()
+
+
+_SOCKETS = """
+import os
+from kineme.sensors.lsl import LslSink, LslSource
+source, sink = LslSource(name="nobody"), LslSink()
+source.receive(0.5)
+own = set()
+for name in os.listdir("/proc/self/fd"):
+    try:
+        own.add(os.readlink(f"/proc/self/fd/{name}")[8:-1])  # socket:[inode]
+    except OSError:
+        pass
+for line in list(open("/proc/self/net/udp"))[1:] + list(open("/proc/self/net/udp6"))[1:]:
+    fields = line.split()
+    if fields[9] in own and fields[1].endswith(":40BB"):
+        print(fields[1])
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="no /proc")
+def test_streams_are_announced_to_this_machine_alone():
+    """Port 16571 is where LSL answers who looks for streams."""
+    environment = {key: value for key, value in os.environ.items() if key != "LSLAPICFG"}
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+    done = subprocess.run(
+        [sys.executable, "-c", _SOCKETS], env=environment, capture_output=True, text=True, check=True, timeout=60
+    )
+    assert set(done.stdout.split()) == {"0100007F:40BB"}
