@@ -44,7 +44,12 @@ def measure(quick: bool) -> list[Row]:
                 print(f"sensors: {module} is not installed")
                 continue
             taken = _latencies(protocol, python, folder, samples)
-            details = {"symbols": len(taken), "rate": RATE, "demonstrations": OF_EACH * len(NAMES), "nice": os.nice(0)}
+            details = {
+                "symbols": len(taken),
+                "rate": RATE,
+                "demonstrations": OF_EACH * len(NAMES),
+                "real time": os.sched_getscheduler(0) == os.SCHED_FIFO,
+            }
             named = {"lsl": "LSL", "osc": "OSC", "ros": "ROS 2"}[protocol]
             rows += [
                 Row(f"from a sample to its symbol, {named}, median", "ms", float(np.median(taken)),

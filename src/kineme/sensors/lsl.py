@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.io.records import needs
+from kineme.io.records import damaged_as, needs
 from kineme.movements.channels.column_match import Columns
 from kineme.sensors.listen import NOTHING, Block, Symbol
 
@@ -22,7 +22,7 @@ _SYNCHRONIZED = 5.0  # seconds that the first comparison of clocks may take
 
 def _load(lan: bool) -> Any:
     """Load the library of LSL; its settings hold for the process. Those that a user names in LSLAPICFG stay."""
-    with needs("pylsl", "speak LSL", "lsl"):
+    with damaged_as("expected the library of LSL beside pylsl", RuntimeError), needs("pylsl", "speak LSL", "lsl"):
         import pylsl
     if not lan and "LSLAPICFG" not in os.environ:
         pylsl.set_config_content(_LOCAL)
