@@ -51,6 +51,7 @@ QUESTIONS = {
     "poses in the shell": "how-to/poses-in-the-shell",
     "labels from file names": "how-to/labels-from-file-names",
     "rate of a stream": "how-to/rate-of-a-stream",
+    "lab streaming layer": "how-to/sensors",
     "trim rests": "how-to/trim-rests",
     "units millimeters": "how-to/units",
     "my file is not read": "how-to/file-not-read",
