@@ -114,6 +114,8 @@ def test_a_point_within_a_ball_is_met_and_it_says_by_how_much_the_ball_is_touche
         f"the movement passes {gap:.3g} from the middle of obstacle 1, whose radius is {ball['radius']:.3g}: "
         "move the obstacle, or the point that lies in it"
     ]
+    without = _rollout(client, {"symbol": symbol}, via=via)["positions"]
+    np.testing.assert_allclose(path, without, atol=1e-9 * size)  # there is no way around, and none is sought
     around_start = {"center": shown[0].tolist(), "radius": size}
     assert "whose radius is" in _rollout(client, {"symbol": symbol}, obstacles=[around_start])["warnings"][-1]
 
