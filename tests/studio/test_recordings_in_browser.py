@@ -13,7 +13,7 @@ from test_episodes_in_browser import FILM, ROW
 
 from browsing import Pages, wait_until
 
-#: How many pixels of the picture of the shape have another color than the ground, and where the marker is.
+#: How many pixels of the picture of the shape are painted.
 INKED = """() => {
   const canvas = document.getElementById("shape");
   const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -182,7 +182,7 @@ def test_a_marker_goes_along_the_shape_and_a_video_of_the_person_beside_it(opene
     page.set_input_files("#file", _file("drawn.csv", 0, 2, heads="t,x,y", times=True))
     wait_for_text(page, "#recording-name", "drawn.csv")
     settle(page)
-    assert page.evaluate(INKED) > 200
+    wait_until(page, f"({INKED})() > 200")
     page.click("#spot")
     wait_until(page, f"{SPANS} === 2")
     page.locator("#playhead").fill("1.2")
