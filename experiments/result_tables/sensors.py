@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from result_tables.measured import DOCS, content, figures
+from result_tables.measured import DOCS, content, figures, rows
 
 PAGE = DOCS / "how-to" / "sensors.md"
 
@@ -10,6 +10,7 @@ PAGE = DOCS / "how-to" / "sensors.md"
 def tables() -> dict[str, str]:
     """Name of each table or sentence -> its text."""
     found, load = figures("sensors"), content("sensors")["load_before"]
+    how = "with real-time priority" if rows("sensors")[0]["details"]["real time"] else "with usual priority"
     words = ", ".join(
         f"{found[f'from a sample to its symbol, {protocol}, median']:.1f} ms over {protocol}"
         for protocol in ("OSC", "LSL", "ROS 2")
@@ -18,5 +19,6 @@ def tables() -> dict[str, str]:
     return {
         "sensors": "From the push of the sample that decides to the symbol in another process it takes, in the median,"
         f"\n{words}\n"
-        f"(95 of 100: at most {late:.0f} ms; on two cores with a load of {load:.0f}, `python -m bench --only sensors`)."
+        f"(95 of 100: at most {late:.0f} ms; {how} on two cores with a load of {load:.0f}, "
+        "`python -m bench --only sensors`)."
     }
