@@ -25,7 +25,7 @@ from kineme.cli import main
 DOCS = Path(__file__).parent
 GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
 #: Package -> words of the commands that need it.
-OPTIONAL = {"mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute")}
+OPTIONAL = {"jax": (), "mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute")}
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 

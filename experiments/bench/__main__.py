@@ -51,6 +51,7 @@ SUBJECTS = (
     "pieces",
     "operators",
     "tensors",
+    "exported",
     "page",
     "migrating",
     "studio",

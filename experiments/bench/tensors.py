@@ -75,7 +75,7 @@ def _ours(n: int, device: str = "cpu") -> dict[str, Callable[[], object]]:
     leaf, paths = weights.clone().requires_grad_(), mp(weights, start, goal).contiguous()
 
     def rollout(w: Any = weights) -> tuple[Any, ...]:
-        return mp(w, start, goal), mp(w, start, goal, derivative=1)
+        return mp(w, start, goal, derivative=(0, 1))
 
     def gradients() -> None:
         leaf.grad = None

@@ -12,7 +12,7 @@ from pathlib import Path
 from result_tables import adapting as adapting_tables
 from result_tables import beside as beside_tables
 from result_tables import concepts as concept_tables
-from result_tables import large_archives, motion_layer, planning
+from result_tables import exported, large_archives, motion_layer, planning
 from result_tables import modulation as modulation_tables
 from result_tables import outliers as outlier_tables
 from result_tables import people as people_tables
@@ -175,6 +175,7 @@ if __name__ == "__main__":
     fill(PAGE, tables())
     for module in GUIDES:
         fill(module.PAGE, module.tables())
+    fill(exported.PAGE, exported.tables())
     fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
     for guide, texts in (motion_layer.tables() | planning.tables()).items():
         fill(guide, texts)

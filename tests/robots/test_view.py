@@ -209,7 +209,12 @@ def test_meshes_are_in_the_page_and_those_that_are_not_there_become_cylinders(tm
     assert b64decode(data["meshes"][0]["content"]) == (tmp_path / "shapes" / "link.stl").read_bytes()
     urdf = ElementTree.fromstring(data["urdf"])
     drawn = {link.get("name"): [shape[0].tag for shape in link.iter("geometry")] for link in urdf.findall("link")}
-    assert drawn == {"l0": ["mesh"], "l1": ["mesh"], "l2": ["cylinder"], "l3": []}
+    assert drawn == {
+        "l0": ["mesh"],
+        "l1": ["mesh"],
+        "l2": ["cylinder", "sphere", "sphere"],
+        "l3": [],
+    }  # with round ends
     assert {one.get("filename") for one in urdf.iter("mesh")} == {"0"}
     assert "drawn as cylinders up to the next joint: lower; their meshes are not there" in page
 

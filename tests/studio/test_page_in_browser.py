@@ -101,6 +101,7 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     assert abs(sum(int(share.removesuffix(" %")) for share in shares) - 100) <= 3
     assert "p-value" not in page.inner_text("main")
     before = page.evaluate("kineme.state.moving.positions")
+    page.get_by_role("button", name="Drag it").click()
     page.mouse.move(*handle(page, "goal"))
     page.mouse.down()
     page.mouse.move(*(handle(page, "goal") + np.array([40, -30])), steps=3)

@@ -567,9 +567,9 @@ def test_a_wrong_constant_is_seen(file, right, wrong, worst, tmp_path):
 
 def test_words_are_those_of_python_at_every_confidence():
     cases = [
-        (confidence, {"isNew": is_new, "isGuess": is_guess, "isOver": is_over})
+        (confidence, {"isNew": is_new, "isGuess": is_guess})
         for confidence in (0.5, 0.98999, 0.99, 0.995, 0.99899, 0.999, 1.0)
-        for is_new, is_guess, is_over in product((False, True), repeat=3)
+        for is_new, is_guess in product((False, True), repeat=2)
     ]
     script = (
         f"import {{ certainty }} from {json.dumps((FOLDER / 'certainty.js').as_uri())}; const [least, cases] = "
@@ -577,8 +577,7 @@ def test_words_are_those_of_python_at_every_confidence():
         "console.log(JSON.stringify(cases.map(([confidence, what]) => certainty(least, confidence, what))))"
     )
     assert in_node(script) == [
-        certainty(confidence, is_new=what["isNew"], is_guess=what["isGuess"], is_over=what["isOver"])
-        for confidence, what in cases
+        certainty(confidence, is_new=what["isNew"], is_guess=what["isGuess"]) for confidence, what in cases
     ]
 
 

@@ -305,6 +305,7 @@ WRITES = [
     ("post", "/api/library/symbols/x/split", {"ids": [1], "name": "y"}),
     ("delete", "/api/library/symbols/x", None),
     ("post", "/api/library/undo", {}),
+    ("post", "/api/library/example", {"name": "letters"}),
 ]
 
 
@@ -320,8 +321,11 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-READING = {f"/{path}" for path in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings", "wand")}
-READING |= {"/recordings/{key}/spotted", "/episodes/{key}/spans"}
+READING = {f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING.add("/wand")
+READING |= {f"/recordings/{{key}}/{act}" for act in ("spotted", "read", "shapes", "annotations")} | {
+    "/episodes/{key}/spans"
+}
 
 
 def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):

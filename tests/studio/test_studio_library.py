@@ -18,6 +18,7 @@ from studio_samples import drawing, make_library, request_of
 
 from kineme import ActionLibrary, Trajectory
 from kineme.cli import main
+from kineme.datasets import EXAMPLES
 from kineme.errors import DataError
 from kineme.library import learn as learning
 from kineme.library.storage.store import Store
@@ -360,6 +361,45 @@ def test_the_answer_is_that_of_the_library(client, folder):
     assert (answer["confidence"], answer["p_known"]) == pytest.approx((ours.confidence, ours.p_known))
     assert [neighbor["index"] for neighbor in answer["nearest"]] == [neighbor.index for neighbor in ours.nearest]
     json.dumps(answer, allow_nan=False)
+
+
+def test_an_answer_is_explained_as_in_python(client, folder):
+    given = request_of(3, seed=5)
+    explained = client.post("/api/why", json=given).json()
+    with ActionLibrary(folder, read_only=True) as library:
+        ours = library.recognize(_array(given)).explain().to_dict()
+    for key in ("path", "answer", "in_words"):
+        assert explained[key] == ours[key]
+    for role in ("nearest", "runner_up"):
+        assert explained[role] == ours[role] | {"similarity": pytest.approx(ours[role]["similarity"], rel=1e-4)}
+
+
+def test_one_movement_of_one_symbol_is_recognized_again(tmp_path, open_studio):
+    client = open_studio(tmp_path / "new")
+    client.post("/api/library/movements", json=request_of(1, label="mine"))
+    answer = client.post("/api/recognize", json=request_of(1, seed=5)).json()
+    assert (answer["label"], answer["certainty"]) == ("mine", "looks like")
+    assert client.post("/api/why", json=request_of(1, seed=5)).json()["runner_up"] is None
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_is_learned_and_taken_back(tmp_path, open_studio, name):
+    client = open_studio(tmp_path / "new")
+    learned = client.post("/api/library/example", json={"name": name}).json()
+    assert len(learned["ids"]) == client.get("/api/library").json()["n_movements"] > 20
+    client.post("/api/library/undo", json={"version": learned["version"]})
+    assert client.get("/api/library").json()["n_movements"] == 0
+
+
+def test_no_other_example_is_learned_nor_one_of_other_dimensions_or_into_what_is_only_shown(
+    client, folder, open_studio
+):
+    said = client.post("/api/library/example", json={"name": "dances"})
+    assert (said.status_code, "'letters'" in said.json()["error"]) == (400, True)
+    said = client.post("/api/library/example", json={"name": "arm"})
+    assert (said.status_code, "dimensions" in said.json()["error"]) == (400, True)
+    said = open_studio(folder, read_only=True).post("/api/library/example", json={"name": "letters"})
+    assert said.status_code == 403
 
 
 def test_drawings_of_more_than_a_thousand_samples_are_taken(client):

@@ -219,6 +219,14 @@ def _refused(folder, *options):
     return done.exit_code, done.output
 
 
+def test_without_a_library_it_opens_that_of_the_folder_actions(monkeypatch):
+    monkeypatch.delenv("KINEME_LIBRARY", raising=False)
+    served = []
+    monkeypatch.setattr("kineme.studio.server.serve.serve", lambda options, ready: served.append(options))
+    assert CliRunner().invoke(main, ["studio", "--no-open"]).exit_code == 0
+    assert str(served[0].folder) == "actions"
+
+
 @pytest.mark.parametrize(("options", "code", "words"), REFUSED, ids=str)
 def test_what_cannot_be_served_is_refused_in_one_line(tmp_path, options, code, words):
     exit_code, said = _refused(tmp_path / "x", *options)

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from studio_samples import drawing
 
 from kineme import ActionLibrary, Trajectory
 from kineme.errors import DataError
+from kineme.io.writing.write_movement import WRITERS
+from kineme.robots import load
 from kineme.robots.kinematics import descent as reach
+from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.models.robot import MODELS
 from kineme.robots.planning import robot_movement as refusal
 from kineme.studio.server import robot_routes
 from kineme.studio.server.refusals import in_studio_words
@@ -47,6 +55,8 @@ def test_an_arm_executes_a_symbol_with_its_checks_and_what_draws_it(client, symb
     scene = moved["scene"]
     assert len(scene["times"]) == len(scene["positions"]) == len(scene["executed"])
     assert "<robot" in scene["urdf"]
+    without = _move(client, symbol, shapes=False).json()["scene"]
+    assert without == {**scene, "urdf": "", "meshes": []}
 
 
 def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, symbol, arms):
@@ -104,3 +114,65 @@ def test_without_the_extra_it_says_what_to_install(client, monkeypatch):
     answer = client.get("/api/robots").json()
     assert (answer["available"], answer["robots"]) == (False, [])
     assert "kineme[robot]" in answer["why"]
+
+
+def test_an_arm_stands_at_rest_before_it_has_moved(client, arms):
+    for name in arms:
+        answer = client.get(f"/api/robots/{name}").json()
+        scene, robot = answer["scene"], load(name)
+        np.testing.assert_allclose(scene["positions"], [robot.rest], atol=1e-6)
+        assert (scene["times"], answer["checks"], answer["table"]) == ([0.0], [], [])
+    assert client.get("/api/robots/other").status_code == 400
+
+
+def test_the_table_says_what_the_checks_say(client, symbol, arms):
+    moved = _move(client, symbol).json()
+    assert all(row[0].startswith(check["what"]) for row, check in zip(moved["table"], moved["checks"], strict=True))
+    assert {row[-1] for row in moved["table"]} <= {"ok", ""}
+
+
+def test_the_joints_are_saved_in_each_format_of_the_page(client, symbol, arms, tmp_path):
+    page = (Path(robot_routes.__file__).parents[1] / "web" / "index.html").read_text()
+    formats = re.findall(r'value="(\w+)"', page[page.index('id="robot-format"') : page.index('id="robot-save"')])
+    assert [f".{each}" for each in formats] == [".csv", ".json", ".npz", ".parquet", ".yaml", ".mcap", ".bag"]
+    drawn = re.findall(r'value="(\w+)"', page[page.index('id="export-format"') : page.index('id="export"')])
+    assert sorted(f".{each}" for each in drawn) == sorted(WRITERS)
+    moved = _move(client, symbol).json()["scene"]
+    body = {"what": {"symbol": symbol}, "robot": "panda", "size": SIZE, "slow_down": True}
+    for each in formats:
+        saved = client.post("/api/robots/export", json={**body, "format": each})
+        assert saved.status_code == 200, saved.text
+        assert f"kind_0_on_panda.{each}" in saved.headers["Content-Disposition"]
+        (tmp_path / f"joints.{each}").write_bytes(saved.content)
+    goal = json.loads((tmp_path / "joints.yaml").read_text())["trajectory"]
+    np.testing.assert_allclose([point["positions"] for point in goal["points"]], moved["positions"], atol=1e-5)
+    table = np.loadtxt(tmp_path / "joints.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table[:, 1:8], moved["positions"], atol=1e-5)
+    assert client.post("/api/robots/export", json={**body, "format": "exe"}).status_code == 400
+    refused = client.post("/api/robots/export", json={**body, "duration": 0.2, "slow_down": False, "format": "csv"})
+    assert refused.status_code == 400  # what must not be executed is not saved
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_tip_follows_a_hand(client, arms, name):
+    robot, joints = load(name), None
+    home = kinematics(robot, robot.rest[None])[0][0]
+    for hand in ([0.0, 0.0], [0.3, 0.0], [0.6, 0.3], [0.6, 0.6], [9.0, -0.2]):
+        answer = client.post("/api/robots/follow", json={"robot": name, "hand": hand, "joints": joints}).json()
+        joints = answer["joints"]
+        tip = kinematics(robot, np.array([joints]))[0][0]
+        across, up = np.clip(hand, -1, 1) * 0.4 * np.linalg.norm(home)
+        wanted = np.add(home, [0.0, across, up])
+        assert answer["distance"] == pytest.approx(np.linalg.norm(tip - wanted), abs=1e-9)
+        assert answer["distance"] < 0.005 or hand[0] == 9.0
+        assert (robot.lower <= joints).all()
+        assert (robot.upper >= joints).all()
+    assert client.post("/api/robots/follow", json={"robot": name, "hand": [0, 0], "joints": [0.0]}).status_code == 400
+
+
+def test_a_start_and_a_goal_may_be_where_they_were_dragged_on_the_arm(client, symbol, arms):
+    scene = _move(client, symbol).json()["scene"]
+    at, goal = np.array(scene["start"]), np.add(scene["goal"], [0.02, -0.03, 0.0])
+    goal[2] = at[2]
+    wanted = np.array(_move(client, symbol, at=at.tolist(), goal=goal.tolist()).json()["scene"]["wanted"])
+    np.testing.assert_allclose(wanted[[0, -1]], [at, goal], atol=1e-5)

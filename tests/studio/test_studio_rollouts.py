@@ -77,16 +77,45 @@ def test_rollouts_do_not_wait_for_each_other_and_each_has_its_own_warnings(clien
     assert "outside what was demonstrated" in far["warnings"][0]
 
 
-def test_it_goes_around_balls_or_says_that_it_does_not(client, symbol):
+@pytest.mark.parametrize("formulation", list(FORMULATIONS))
+@pytest.mark.parametrize("aside", [0.0, 0.001, 0.03, -0.03])
+def test_it_goes_around_balls_and_meets_its_via_points(client, symbol, formulation, aside):
+    body = {"formulation": formulation, "rate": 1000}
+    shown = np.array(_rollout(client, {"symbol": symbol}, **body)["positions"])
+    size = np.ptp(shown, axis=0).max()
+    along = shown[len(shown) // 2 + 1] - shown[len(shown) // 2 - 1]
+    away = along[::-1] * [-1, 1] / np.linalg.norm(along)
+    balls = [
+        {"center": (shown[round(share * len(shown))] + aside * size * away).tolist(), "radius": 0.05 * size}
+        for share in (0.5, 0.75)
+    ]
+    via = [[0.6, (shown[round(0.6 * len(shown))] + 0.05 * size).tolist()]]
+    moved = _rollout(client, {"symbol": symbol}, obstacles=balls, via=via, **body)
+    path = np.array(moved["positions"])
+    for ball in balls:
+        assert np.linalg.norm(shown - ball["center"], axis=1).min() < ball["radius"]
+        assert np.linalg.norm(path - ball["center"], axis=1).min() >= ball["radius"]
+    assert moved["warnings"] == []
+    reached = path[np.abs(np.array(moved["times"]) - 0.6 * moved["times"][-1]).argmin()]
+    assert np.linalg.norm(reached - via[0][1]) < 0.005 * size
+    np.testing.assert_allclose(path[[0, -1]], shown[[0, -1]], atol=1e-6 * size)
+
+
+def test_a_point_within_a_ball_is_met_and_it_says_by_how_much_the_ball_is_touched(client, symbol):
     shown = np.array(_rollout(client, {"symbol": symbol})["positions"])
-    middle, size = shown[100], np.ptp(shown, axis=0).max()
-    ball = {"center": (middle + 0.001 * size).tolist(), "radius": 0.05 * size}
-    moved = _rollout(client, {"symbol": symbol}, obstacles=[ball])
-    gap = np.linalg.norm(np.array(moved["positions"]) - ball["center"], axis=1).min()
-    assert gap >= ball["radius"] or moved["warnings"]
-    assert np.linalg.norm(shown - ball["center"], axis=1).min() < ball["radius"]
+    size = np.ptp(shown, axis=0).max()
+    via = [[0.5, (shown[100] + 0.01 * size).tolist()]]
+    ball = {"center": shown[100].tolist(), "radius": 0.05 * size}
+    moved = _rollout(client, {"symbol": symbol}, obstacles=[ball], via=via)
+    path = np.array(moved["positions"])
+    assert np.linalg.norm(path[100] - via[0][1]) < 0.002 * size
+    gap = np.linalg.norm(path - ball["center"], axis=1).min()
+    assert moved["warnings"] == [
+        f"the movement passes {gap:.3g} from the middle of obstacle 1, whose radius is {ball['radius']:.3g}: "
+        "move the obstacle, or the point that lies in it"
+    ]
     around_start = {"center": shown[0].tolist(), "radius": size}
-    assert "whose radius is" in _rollout(client, {"symbol": symbol}, obstacles=[around_start])["warnings"][0]
+    assert "whose radius is" in _rollout(client, {"symbol": symbol}, obstacles=[around_start])["warnings"][-1]
 
 
 @pytest.mark.skipif(NODE is None, reason=REASON)

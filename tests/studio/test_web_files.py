@@ -190,8 +190,7 @@ await refresh();
 console.log(JSON.stringify({ seen, requests, log, refused: await failing, after, now: library().version }));"""
 
 
-FOLLOWED = """const { Rollouts } = await import(`${process.argv[1]}/move/rollouts.js`);
-const { primitiveOf } = await import(`${process.argv[1]}/move/primitives.js`);
+FOLLOWED = """const { Rollouts, primitiveOf } = await import(`${process.argv[1]}/move/rollouts.js`);
 const requests = [];
 globalThis.fetch = (path, { body }) => {
   const { what } = JSON.parse(body);

@@ -6,7 +6,7 @@ import numpy as np
 
 import kineme
 
-FORMULATIONS = ("bio-inspired", "decoupled", "original")
+FORMULATIONS = ("bio-inspired", "decoupled", "original", "amplitude-scaled")
 DURATION, RATE = 0.7, 40.0
 
 

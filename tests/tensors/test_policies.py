@@ -12,7 +12,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 
 torch = pytest.importorskip("torch", reason="the extra torch is not installed")
 
-from tensor_movements import RATE, learned, module, tensors  # noqa: E402 - after the package that may be missing
+from tensor_movements import DURATION, RATE, learned, module, tensors  # noqa: E402 - after the package that may be missing
 from torch.autograd import gradcheck  # noqa: E402
 
 import kineme  # noqa: E402
@@ -93,6 +93,57 @@ def test_the_black_box_wrapper_of_fancy_gym_is_served():
     numbers = torch.tensor(params, dtype=torch.float32).reshape(2, 7)
     whole = mp(numbers[:, :-1], torch.tensor(start), numbers[:, -1])
     assert np.abs(np.array(executed) - whole[1:].numpy()).max() < 1e-5
+
+
+@pytest.mark.filterwarnings("ignore")  # fancy_gym itself is warned by gymnasium
+def test_fancy_gym_itself_moves_a_mass_and_replans():
+    pytest.importorskip("fancy_gym", reason="fancy_gym is not installed: its own wrapper does not run")
+    import gymnasium as gym
+    from fancy_gym.black_box.black_box_wrapper import BlackBoxWrapper
+    from fancy_gym.black_box.controller.pos_controller import PosController
+    from fancy_gym.black_box.raw_interface_wrapper import RawInterfaceWrapper
+
+    class Mass(gym.Env):
+        """A mass that is where it is sent, a step of 1 / RATE later."""
+
+        observation_space = action_space = gym.spaces.Box(-10.0, 10.0, (2,), np.float64)
+        dt = 1 / RATE
+
+        def reset(self, *, seed=None, options=None):
+            self.positions, self.velocity = [np.array([0.2, -0.1])], np.zeros(2)
+            return self.positions[0], {}
+
+        def step(self, action):
+            self.velocity = (action - self.positions[-1]) / self.dt
+            self.positions.append(action)
+            return action, 0.0, False, False, {}
+
+    class Raw(RawInterfaceWrapper):
+        @property
+        def context_mask(self):
+            return np.ones(2, dtype=bool)
+
+        @property
+        def current_pos(self):
+            return self.env.unwrapped.positions[-1]
+
+        @property
+        def current_vel(self):
+            return self.env.unwrapped.velocity
+
+    mp, mass = module(), Mass()
+    environment = BlackBoxWrapper(
+        Raw(mass), Trajectories(mp, low=-2.0, high=2.0), PosController(), DURATION,
+        replanning_schedule=lambda position, velocity, observation, action, t: t % 10 == 0, condition_on_desired=True,
+    )  # fmt: skip
+    assert environment.action_space.shape == (14,)
+    params = np.random.default_rng(0).uniform(-1, 1, 14)
+    environment.reset(seed=0)
+    lengths = [environment.step(params)[4]["trajectory_length"] for _ in range(3)]
+    assert lengths == [10, 10, 8]
+    numbers = torch.tensor(params).reshape(2, 7)
+    planned = mp(numbers[:, :-1], torch.tensor(mass.positions[0]), numbers[:, -1])
+    assert np.abs(np.array(mass.positions) - planned.numpy()).max() < 1e-6
 
 
 def test_trajectories_have_the_duration_and_rate_that_are_set():

@@ -31,8 +31,7 @@ def test_movements_are_those_of_numpy(formulation, gating):
         for options in ({"duration": 0.5}, {"goal": goals}, {"goal": goals, "velocity": velocities, "duration": 0.5}):
             expected = primitives.rollout(**options)
             given_tensors = {name: torch.tensor(value) for name, value in options.items()}
-            for k, name in enumerate(ORDERS):
-                path = mp(**given_tensors, derivative=k)
+            for name, path in zip(ORDERS, mp(**given_tensors, derivative=(0, 1, 2)), strict=True):
                 assert path.dtype == dtype
                 size = np.abs(getattr(expected, name)).max()
                 assert np.abs(path.numpy() - getattr(expected, name)).max() <= tolerance * size
@@ -51,6 +50,8 @@ def test_learning_is_that_of_numpy(formulation, fit):
         mp = kineme.torch.Primitive.of(expected, n_samples=90, dtype=dtype)
         weights, goals = mp.encode(torch.tensor(positions, dtype=dtype))
         w = expected.weights.transpose(0, 2, 1)
+        if formulation == "amplitude-scaled":  # per distance
+            w = w / np.linalg.norm(expected.goals - expected.starts, axis=1)[:, None, None]
         assert np.abs(weights.numpy() - w).max() <= tolerance * np.abs(w).max()
         assert np.allclose(goals.numpy(), expected.goals, atol=tolerance)
         v = mp.initial_velocity(torch.tensor(positions, dtype=dtype)).numpy()
@@ -122,7 +123,7 @@ def test_compiled_and_exported_modules_are_the_module():
 
     def all_of_it(w, x, g, v):
         path = mp(w, x, g, velocity=v)
-        return path, mp(w, x, g, velocity=v, derivative=2), *mp.encode(path)
+        return path, *mp(w, x, g, velocity=v, derivative=(1, 2)), *mp.encode(path)
 
     compiled = torch.compile(all_of_it, backend="aot_eager", fullgraph=True)
     numbers = (weights, start, goal, velocity)
@@ -130,6 +131,19 @@ def test_compiled_and_exported_modules_are_the_module():
     batch = torch.export.Dim("batch")
     exported = torch.export.export(mp, (weights, start, goal), dynamic_shapes=[{0: batch}] * 3)
     assert torch.equal(exported.module()(weights[:3], start[:3], goal[:3]), mp(weights[:3], start[:3], goal[:3]))
+
+
+@pytest.mark.filterwarnings("ignore")  # the exporter is warned by PyTorch itself
+def test_a_module_is_exported_to_onnx(tmp_path):
+    pytest.importorskip("onnxscript", reason="onnxscript, with which PyTorch writes ONNX, is not installed")
+    onnxruntime = pytest.importorskip("onnxruntime", reason="the extra onnx is not installed")
+    mp, names = module("original", dtype=torch.float32), ("weights", "start", "goal")
+    numbers = [part.float() for part in tensors((4, 2, 6), (4, 2), (4, 2))]
+    shapes, path = ({0: "batch"},) * 3, tmp_path / "movements.onnx"
+    torch.onnx.export(mp, tuple(numbers), path, dynamo=True, dynamic_shapes=shapes, input_names=names, verbose=False)
+    some = {name: part[:3] for name, part in zip(names, numbers, strict=True)}
+    exported = onnxruntime.InferenceSession(path).run(None, {name: part.numpy() for name, part in some.items()})[0]
+    assert np.allclose(exported, mp(**some).numpy(), atol=1e-5)
 
 
 def test_nothing_looks_at_values():
@@ -171,15 +185,19 @@ def test_weights_mean_the_same_at_another_rate(formulation):
     mp = kineme.torch.Primitive.of(primitives, dtype=torch.float64).at_rate(70.0, 1.3)
     expected = primitives.rollout(duration=1.3, rate=70.0)
     assert np.allclose(mp(derivative=1).numpy(), expected.velocities, atol=1e-11)
+    assert torch.equal(mp(derivative=(0, 1))[1], mp(derivative=1))
 
 
 def test_what_cannot_be_used_is_refused():
     mp = module()
     weights, start, goal = tensors((4, 2, 6), (4, 2), (4, 2))
-    with pytest.raises(SpecificationError, match=r'expected formulation .* got "amplitude-scaled"'):
-        module("amplitude-scaled")
     with pytest.raises(SpecificationError, match="got RhythmicPrimitives"):
         kineme.torch.Primitive.of(kineme.RhythmicDMP().learn([np.sin(np.linspace(0, 20, 200))]))
+    loop = np.stack([np.cos(np.linspace(0, 2 * np.pi, 50)), np.sin(np.linspace(0, 2 * np.pi, 50))], axis=-1)
+    with pytest.raises(
+        DegenerateMovementError, match="trajectory 0: expected a movement that does not end where it st"
+    ):
+        kineme.torch.Primitive.of(kineme.DMP("amplitude-scaled").learn([loop]))
     with pytest.raises(DegenerateMovementError, match="g != x0"):
         kineme.torch.Primitive.of(kineme.DMP("original").learn([np.sin(np.linspace(0, 2 * np.pi, 50))]))
     with pytest.raises(SpecificationError, match="two samples in each time constant"):

@@ -86,6 +86,7 @@ layout_options = under(
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
     click.option("--person-column", metavar="COLUMN", help="Column of who showed the movements of a table."),
     click.option("--units", type=_UNIT, help="Unit of the time stamps, by name or in seconds."),
+    click.option("--measured-in", metavar="UNIT", help="Unit of the coordinates of which the file says none, as mm."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a repeated sample, or for missing values that are not filled.",
@@ -123,8 +124,8 @@ layout_options = under(
         "--join-files", is_flag=True, default=None,
         help="The files of a folder that lie on one clock, as a phone's sensors, are one recording.",
     ),
-    click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
+    click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
 )  # fmt: skip
 
 #: Names of the parameters that `layout_options` adds.

@@ -19,7 +19,7 @@ _PORTS = click.IntRange(1, 65535)
 
 
 @click.command(short_help="Show, name and move it in the browser.")
-@library_option_of(required=True, words="Folder of the action library; made if there is none.")
+@library_option_of(required=False, words="Folder of the action library; made if there is none.  [default: actions]")
 @click.option("--recordings", type=click.Path(path_type=Path),
               help="Data set of LeRobot, folder or file whose episodes are shown, named and corrected.")  # fmt: skip
 @click.option("--port", type=_PORTS, help="Port to serve at.  [default: 8420, or any that is free]")
@@ -37,10 +37,12 @@ def studio(folder: Any, recordings: Path | None, port: int | None, no_open: bool
     As in:
 
     \b
-    kineme studio --library actions/
+    kineme studio
     kineme studio --library actions/ --recordings lerobot_dataset/
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.studio.server.serve import Options, is_loopback, serve
+
+    folder = folder or Path("actions")
 
     def ready(address: str, once: str) -> None:
         only = ", for reading only" if read_only else ""

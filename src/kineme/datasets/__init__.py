@@ -1,4 +1,4 @@
-"""Data sets of real recordings that are installed with the package."""
+"""Data sets that are installed with the package: recordings, and movements to begin with."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

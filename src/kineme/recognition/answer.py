@@ -379,19 +379,17 @@ def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor
     return tuple(Neighbor(int(i), names[i] if names else None, float(np.exp(logs[i]))) for i in best)
 
 
-def certainty(confidence: float, *, is_new: bool, is_guess: bool, is_over: bool = True) -> Certainty:
+def certainty(confidence: float, *, is_new: bool, is_guess: bool) -> Certainty:
     """Tell how sure it is that a movement is of the class that is said.
 
     - `confidence`: probability of that class if the movement is of a known one.
     - `is_new`: whether the movement is unlike every known class.
     - `is_guess`: whether too few demonstrations tell what is unlike them: the answer then is what the movement looks
       like.
-    - `is_over`: whether the whole movement was seen. What is under way looks like a class, no more: it may go on
-      otherwise.
     """
     if is_new:
         return "new"
-    if is_guess or not is_over or confidence < LEAST_CONFIDENCE["probably"]:
+    if is_guess or confidence < LEAST_CONFIDENCE["probably"]:
         return "looks like"
     return "sure" if confidence >= LEAST_CONFIDENCE["sure"] else "probably"
 

@@ -35,7 +35,7 @@ class ActionChunk(torch.nn.Module):
     Raises
     ------
     SpecificationError
-        A primitive in the original formulation, which cannot leave where the goal is the start.
+        A primitive in the formulation "original" or "amplitude-scaled": with the goal at the start it cannot move.
 
     Examples
     --------
@@ -49,10 +49,10 @@ class ActionChunk(torch.nn.Module):
     def __init__(self, primitive: Primitive, scale: float = 1.0) -> None:
         super().__init__()
         check_number("scale", scale, above=0.0)
-        if primitive.dmp.system.divides_by_amplitude:
+        if primitive.counts_per_distance:
             raise SpecificationError(
-                'expected the formulation "bio-inspired" or "decoupled", got "original", in which a chunk whose goal '
-                "is its start cannot move"
+                'expected the formulation "bio-inspired" or "decoupled", got '
+                f'"{primitive.dmp.formulation}", in which a chunk whose goal is its start cannot move'
             )
         self.primitive, self.scale = primitive, float(scale)
 
@@ -62,8 +62,13 @@ class ActionChunk(torch.nn.Module):
         return self.primitive.dims * (self.primitive.dmp.n_basis + 1)
 
     def forward(
-        self, outputs: Tensor, position: Tensor, velocity: Tensor | None = None, *, derivative: int = 0
-    ) -> Tensor:
+        self,
+        outputs: Tensor,
+        position: Tensor,
+        velocity: Tensor | None = None,
+        *,
+        derivative: int | tuple[int, ...] = 0,
+    ) -> Any:
         """Actions (..., T, d), the first at the present; or their velocities or accelerations.
 
         Parameters
@@ -74,7 +79,7 @@ class ActionChunk(torch.nn.Module):
             At the beginning of the chunk, in the user's unit.
         velocity : Tensor of shape (..., d), optional
             Then, per second; by default 0.
-        derivative : {0, 1, 2}, default 0
+        derivative : {0, 1, 2} or tuple of these, default 0
             As in `Primitive.forward`.
 
         Raises

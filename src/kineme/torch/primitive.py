@@ -23,9 +23,10 @@ from torch import Tensor
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import decoder, encoder
 from kineme.dmp.discrete.rollout import samples_at_rate
+from kineme.dmp.discrete.specification import CLOSED
 from kineme.dmp.spring_damper import NODE_WEIGHTS, NODES
-from kineme.errors import SpecificationError, TrajectoryError
-from kineme.validation import check_count, check_number, check_samples
+from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
+from kineme.validation import check_count, check_number, check_samples, describe
 
 _LEARNED = ("weights", "start", "goal", "velocity")
 
@@ -62,20 +63,22 @@ class Primitive(torch.nn.Module):
     weights, start, goal, velocity : Tensor or None
         Those of learned primitives, (n, d, N) and (n, d); see `of`.
     decode_matrix : Tensor of shape (3, N + 3, T)
-        From ``[w, g - x0, tau v0, x0]`` to positions, and to their first two derivatives in u.
+        From ``[w, g - x0, tau v0, x0]`` to positions, and to their first two derivatives in u; w is times the distance
+        where weights count per distance.
     encode_matrix : Tensor of shape (T, N)
-        From positions less x0 to w; in the formulation "original" to (g - x0) w.
+        From positions less x0 to w; to w times the distance where weights count per distance.
 
     Raises
     ------
     SpecificationError
-        A parameter out of its range; ``formulation="amplitude-scaled"``, whose scale depends on the distance that
-        was demonstrated, which weights, start and goal do not tell.
+        A parameter out of its range.
 
     Notes
     -----
     Weights are w of Eq. (2), (..., d, N): ``primitives.weights`` transposed. In the formulations "bio-inspired" and
-    "decoupled" they are in the unit of the positions; in "original" they count per distance from start to goal.
+    "decoupled" they are in the unit of the positions. In "original" they count per distance g - x0 of their dimension,
+    in "amplitude-scaled" per distance |g - x0| in space: there they are ``primitives.weights`` over the learned
+    distance, so that shapes grow with the distance as the formulation has it.
     """
 
     decode_matrix: Tensor
@@ -128,17 +131,18 @@ class Primitive(torch.nn.Module):
         Raises
         ------
         SpecificationError
-            Other primitives, such as rhythmic ones; the formulation "amplitude-scaled".
+            Other primitives, such as rhythmic ones.
         DegenerateMovementError
-            In the original formulation, where ``g = x0`` in a dimension.
+            In the formulation "original", where ``g = x0`` in a dimension; in "amplitude-scaled", a closed movement.
         """
         if not isinstance(primitives, Primitives):
             raise SpecificationError(f"expected primitives of kineme.DMP, got {type(primitives).__name__}")
         dmp = primitives.dmp
         n_samples = dmp.n_points if n_samples is None else check_count("n_samples", n_samples, 2)
-        learned = (
-            primitives.weights.transpose(0, 2, 1), primitives.starts, primitives.goals, primitives.velocities
-        )  # fmt: skip
+        weights = primitives.weights.transpose(0, 2, 1)
+        if dmp.formulation == "amplitude-scaled":
+            weights = weights / _distances(primitives)
+        learned = weights, primitives.starts, primitives.goals, primitives.velocities
         n_samples = check_samples(n_samples, dmp.n_basis, "n_samples")
         named = {name: torch.tensor(values) for name, values in zip(_LEARNED, learned, strict=True)}
         return cls._new(dmp, primitives.n_dims, n_samples, named, primitives.durations, dtype, device)
@@ -160,11 +164,6 @@ class Primitive(torch.nn.Module):
         dtype: torch.dtype | None,
         device: torch.device | str | None,
     ) -> None:
-        if dmp.formulation == "amplitude-scaled":
-            raise SpecificationError(
-                'expected formulation "bio-inspired", "decoupled" or "original", got "amplitude-scaled": its scale '
-                "depends on the distance that was demonstrated, which weights, start and goal do not tell"
-            )
         self.dmp, self.dims, self.n_samples = dmp, dims, n_samples
         self._K, self._D, self._alpha = dmp.K, dmp.D, dmp.basis.phase.alpha
         dtype = torch.get_default_dtype() if dtype is None else dtype
@@ -243,8 +242,8 @@ class Primitive(torch.nn.Module):
         *,
         velocity: Tensor | None = None,
         duration: Tensor | float | None = None,
-        derivative: int = 0,
-    ) -> Tensor:
+        derivative: int | tuple[int, ...] = 0,
+    ) -> Any:
         """Generate movements (..., T, d), in one matrix product.
 
         Parameters
@@ -256,8 +255,9 @@ class Primitive(torch.nn.Module):
             Initial velocity, per second; by default 0, or the learned one in proportion to the tempo.
         duration : Tensor of shape (...) or float, optional
             Another tau [s]; the T samples are spread over it.
-        derivative : {0, 1, 2}, default 0
-            Positions, velocities per second, or accelerations per second squared.
+        derivative : {0, 1, 2} or tuple of these, default 0
+            Positions, velocities per second, or accelerations per second squared. Of a tuple, such as ``(0, 1)``, a
+            tuple of these is returned, which takes less time than one call for each.
 
         Raises
         ------
@@ -267,6 +267,8 @@ class Primitive(torch.nn.Module):
             Weights, start or goal left out where none are learned; another derivative.
         """
         numbers, tau = self._numbers(weights, start, goal, velocity, duration)
+        if isinstance(derivative, tuple):
+            return tuple(self._path(numbers, tau, order) for order in derivative)
         return self._path(numbers, tau, derivative)
 
     def state(
@@ -350,10 +352,8 @@ class Primitive(torch.nn.Module):
             A specification with preprocessing steps, which work on recordings.
         """
         relative, goal = self._relative(positions)
-        weights = relative @ self.encode_matrix
-        if self.dmp.system.divides_by_amplitude:
-            weights = weights / relative[..., -1:]
-        return weights, goal
+        weights, distance = relative @ self.encode_matrix, self._distance(relative[..., -1])
+        return weights if distance is None else weights / distance[..., None], goal
 
     def initial_velocity(self, positions: Tensor, *, duration: Tensor | float | None = None) -> Tensor:
         """Velocities (..., d) per second at the start of movements (..., T, d), which are fitted with the weights."""
@@ -482,12 +482,12 @@ class Primitive(torch.nn.Module):
         return self(weights, start, goal, velocity=velocity, duration=duration)
 
     def _factor(self, chol: Tensor, start: Tensor | None, goal: Tensor | None) -> Tensor:
-        """Factor (..., d, N, d N) of the weights as they act, with the amplitude of the original formulation."""
+        """Factor (..., d, N, d N) of the weights as they act, times the distance where they count per distance."""
         size = self.dims * self.dmp.n_basis
         factor = self._vector("chol", chol, size, size).unflatten(-2, (self.dims, self.dmp.n_basis))
-        if self.dmp.system.divides_by_amplitude:
-            amplitude = self._vector("goal", goal) - self._vector("start", start)
-            factor = factor * amplitude[..., None, None]
+        if self.counts_per_distance:
+            distance = self._distance(self._vector("goal", goal) - self._vector("start", start))
+            factor = factor * distance[..., None, None]
         return factor
 
     def _relative(self, positions: Tensor) -> tuple[Tensor, Tensor]:
@@ -503,6 +503,17 @@ class Primitive(torch.nn.Module):
             )
         x = positions.to(self._u.dtype).mT
         return x - x[..., :1], positions[..., -1, :]
+
+    @property
+    def counts_per_distance(self) -> bool:
+        """Whether shapes grow with the distance from start to goal, so that nothing moves where it is 0."""
+        return self.dmp.formulation in {"original", "amplitude-scaled"}
+
+    def _distance(self, amplitude: Tensor) -> Any:
+        """Distance per which weights count, (..., d) or (..., 1) of g - x0 (..., d); None where it does not matter."""
+        if self.dmp.formulation == "amplitude-scaled":
+            return torch.linalg.vector_norm(amplitude, dim=-1, keepdim=True)
+        return amplitude if self.counts_per_distance else None
 
     def _number(self, value: Tensor | float) -> Tensor:
         return torch.as_tensor(value, dtype=self._u.dtype, device=self._u.device)
@@ -537,20 +548,20 @@ class Primitive(torch.nn.Module):
         else:
             v0 = torch.zeros_like(x0)
         amplitude = g - x0
-        if self.dmp.system.divides_by_amplitude:
-            w = w * amplitude[..., None]
-        parts = [w, *(vector[..., None] for vector in (amplitude, v0, x0))]
-        if any(part.shape[:-1] != w.shape[:-1] for part in parts):
-            batch = torch.broadcast_shapes(*(part.shape[:-2] for part in parts))
-            parts = [part.expand(*batch, *part.shape[-2:]) for part in parts]
-        return torch.cat(parts, dim=-1), tau
+        distance = self._distance(amplitude)
+        w = w if distance is None else w * distance[..., None]
+        vectors = torch.stack(torch.broadcast_tensors(amplitude, v0, x0), dim=-1)
+        if w.shape[:-1] != vectors.shape[:-1]:
+            batch = torch.broadcast_shapes(w.shape[:-2], vectors.shape[:-2])
+            w, vectors = (part.expand(*batch, *part.shape[-2:]) for part in (w, vectors))
+        return torch.cat((w, vectors), dim=-1), tau
 
     def _path(self, numbers: Tensor, tau: Tensor, derivative: int) -> Tensor:
         if derivative not in (0, 1, 2):
             raise SpecificationError(f"expected derivative to be 0, 1 or 2, got {derivative!r}")
-        # Numbers are scaled, since they are fewer than samples.
-        scaled = numbers / tau[..., None, None] ** derivative if derivative else numbers
-        return (scaled @ self.decode_matrix[derivative]).mT
+        for _ in range(derivative):  # numbers are scaled, since they are fewer than samples
+            numbers = numbers / (tau[..., None, None] if tau.ndim else tau)
+        return (numbers @ self.decode_matrix[derivative]).mT
 
     def _states(self, numbers: Tensor, u: Tensor) -> Tensor:
         """States (..., d, 2) in u at shares u (...): those at the even share before, carried on in one step."""
@@ -596,3 +607,15 @@ class Primitive(torch.nn.Module):
 def _constant(goal: Any) -> Any:
     """Response (3, T) to a start elsewhere: all positions are there, and nothing else changes."""
     return np.repeat([[1.0], [0.0], [0.0]], goal.shape[1], axis=1)
+
+
+def _distances(primitives: Primitives) -> Any:
+    """Learned distances |g - x0| (n, 1, 1), refused where a movement is closed."""
+    distances = np.linalg.norm(primitives.goals - primitives.starts, axis=1)
+    closed = distances <= CLOSED * primitives.extents.max(axis=1)
+    if closed.any():
+        raise DegenerateMovementError(
+            f"{describe(int(closed.argmax()), primitives.names)}: expected a movement that does not end where it "
+            'starts, per whose distance the weights of "amplitude-scaled" count, got a closed one; use "bio-inspired"'
+        )
+    return distances[:, None, None]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.dmp.control.plan import ObstacleAvoidance, Status
+from kineme.dmp.control.plan import Status
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.pose.pose_dmp import PoseDMP, PosePrimitives
 from kineme.dmp.recorded_as import in_recording, primitive_columns
@@ -45,7 +45,6 @@ class MovementOptions:
     obstacles: Array | None = None  # (m, d), points to steer around
     meet_goal: bool = False
     via: tuple[tuple[float, Array], ...] = ()  # when, between 0 and 1, and where; obstacles are aimed around
-    avoidance: ObstacleAvoidance | None = None  # how strongly it steers around obstacles
 
 
 class Generated(NamedTuple):
@@ -196,7 +195,6 @@ def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, o
         goal=options.goal,
         duration=duration,
         via=options.via or None,
-        avoidance=options.avoidance,
         settle=options.settle,
     )
     states = [control.state]

@@ -109,6 +109,11 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
                 raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
             parsed = select_columns(parse, layout)
             detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
+            if layout.measured_in is not None:
+                units = detected.measured_in or [""] * len(detected.columns)
+                named = zip(units, detected.columns, strict=True)
+                filled = tuple(unit or unit_of(head) or layout.measured_in for unit, head in named)
+                detected = detected._replace(measured_in=filled)
             block, sentinels = sentinels_as_missing(block, detected.columns)
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)

@@ -53,6 +53,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     fill_gaps: float = FILL_GAPS,
     rows: bool = False,
     every: int | None = None,
+    measured_in: str | None = None,
     join_files: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
@@ -118,6 +119,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         `label` the column of the label. `units` is the step between samples.
     every : int, optional
         Number of samples of a movement, where a file holds one after the other without a mark between them.
+    measured_in : str, optional
+        Unit of the coordinates of which the file says none, such as ``"mm"`` or ``"deg"``.
     join_files : bool, default False
         Whether the files of a folder that lie on one clock, as those of a phone's sensors, are one recording, see
         `kineme.io.reading.join_files`. Its label is the folder around that of the files.
@@ -135,7 +138,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     """
     layout = Layout(
         time, columns, movement, label, units, skip, kinds, topic, frame, person,
-        exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every,
+        exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every, measured_in=measured_in,
     )  # fmt: skip
     rule = NameRule(label_pattern, label_by)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(each) for each in path]

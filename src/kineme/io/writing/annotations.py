@@ -55,9 +55,10 @@ class Annotation:
 
 
 def as_row(annotation: Annotation) -> dict[str, Any]:
-    """Return an annotation as plain data, in the order of `HEADS`; an uncertainty that nobody knows is None."""
+    """Return an annotation as plain data, in the order of `HEADS`; numbers that nobody knows are None."""
     row = {head: getattr(annotation, head) for head in HEADS}
-    return row if math.isfinite(annotation.uncertainty) else row | {"uncertainty": None}
+    unknown = [head for head in ("p_value", "uncertainty") if not math.isfinite(row[head])]
+    return row | dict.fromkeys(unknown)
 
 
 def to_csv(annotations: Sequence[Annotation]) -> bytes:
@@ -143,9 +144,11 @@ def write_elan(path: Path, annotations: Sequence[Annotation], source: Path | Non
     for number, (name, text) in enumerate(_DEPENDENT.items(), 1):
         below = SubElement(root, "TIER", LINGUISTIC_TYPE_REF="number", PARENT_REF="symbol", TIER_ID=name)
         for k, annotation in enumerate(annotations, 1):
+            if (number_text := text(annotation)) == "nan":  # a person named it
+                continue
             ids = {"ANNOTATION_ID": f"a{number * len(annotations) + k}", "ANNOTATION_REF": f"a{k}"}
             referring = SubElement(SubElement(below, "ANNOTATION"), "REF_ANNOTATION", ids)
-            SubElement(referring, "ANNOTATION_VALUE").text = text(annotation)
+            SubElement(referring, "ANNOTATION_VALUE").text = number_text
     plain = {"GRAPHIC_REFERENCES": "false"}
     SubElement(root, "LINGUISTIC_TYPE", plain, LINGUISTIC_TYPE_ID="symbol", TIME_ALIGNABLE="true")
     by_number = {"CONSTRAINTS": _ASSOCIATION, "LINGUISTIC_TYPE_ID": "number", "TIME_ALIGNABLE": "false"}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.movements.tables.time_stamps import PER_SECOND
-from kineme.units import is_unit_of
+from kineme.units import is_unit_of, unit_named
 from kineme.validation import MIN_SAMPLES, Array, check_choice, check_count, check_number
 
 _SHOWN = 40  # names in a message
@@ -72,12 +72,17 @@ class Layout:
     # sample.
     rows: bool = False
     every: int | None = None  # number of samples of a movement, where a recording holds one after the other
+    measured_in: str | None = None  # unit of the coordinates of which the file says none, one of `kineme.units.UNITS`
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
         check_number("fill_gaps", self.fill_gaps, least=0)
         if self.every is not None:
             check_count("every", self.every, MIN_SAMPLES)
+        if self.measured_in is not None and unit_named(self.measured_in) is None:
+            raise SpecificationError(
+                f"expected measured_in to be a unit, such as m, mm, rad or deg, got {self.measured_in!r}"
+            )
         if self.rows and any(choice is not None for choice in (self.every, self.time, self.movement, self.person)):
             raise SpecificationError(
                 "expected rows without every, time, movement and person, since each line is a whole movement, got both"

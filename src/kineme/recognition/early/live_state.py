@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.movements.trajectories.labels import Label
-from kineme.recognition.answer import Certainty, certainty, in_words
+from kineme.recognition.answer import Certainty, in_words
 from kineme.validation import Array
 
 
@@ -87,14 +87,12 @@ class LiveState(NamedTuple):
 
     @property
     def certainty(self) -> Certainty | None:
-        """Certainty so far: "looks like", or "new" where unknown has the largest share; None before a movement.
+        """Certainty so far: "looks like"; None before a movement, and while unknown has the largest share.
 
-        What begins like a known movement may go on otherwise, so that no more is said before the end.
+        What begins like a known movement may go on otherwise, and what is unlike each one so far may end like one in
+        another hand: no more is said before the end, so that the answer to the whole movement contradicts nothing.
         """
-        if not self.ranked:
-            return None
-        best = self.ranked[0].confidence
-        return certainty(best, is_new=self.unknown > best, is_guess=False, is_over=False)
+        return "looks like" if self.ranked and self.unknown <= self.ranked[0].confidence else None
 
     @property
     def probabilities(self) -> dict[Label, float]:
@@ -141,8 +139,9 @@ class LiveState(NamedTuple):
     @property
     def in_words(self) -> str:
         """Words for what the movement looks like so far: the decided class, or the most likely one."""
-        word = self.certainty
-        if word is None:
+        if not self.ranked:
             return "nothing yet"
-        best = str(self.ranked[0].label)
+        best, word = str(self.ranked[0].label), self.certainty
+        if word is None:
+            return f"still open, most like {best} so far"
         return f"{in_words(word, best if self.label is None else str(self.label), best)} so far"

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kineme.errors import DataError
 from kineme.reporting.atomic import write_atomically
@@ -35,7 +36,10 @@ _ROBOTS = "cmeel.prefix/share/example-robot-data/robots"  # within what its whee
 _LARGEST = 16_000_000  # bytes of all meshes of one page
 _MESHES = {".stl": "stl", ".dae": "collada"}
 
-_GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
+_GRAYS = ((0.93, 0.94, 0.96, 1.0), (0.72, 0.75, 0.80, 1.0))  # of links one after the other that have no color
+_CAP = (0.0, 0.27, 0.50, 1.0)  # color of the ends of a joint
+_LONG = 3.0  # times its radius: a longer cylinder is a limb, with round ends, a shorter one a joint, with caps
+_CAPS = 0.8, 0.14  # radius and thickness of a cap, in radii of its joint
 _THICKNESS = 0.12  # of the cylinder between two joints: its radius for each meter of its length
 _THIN, _THICK = 0.01, 0.05  # bounds of that radius [m]
 
@@ -167,20 +171,27 @@ def scene_data(movement: RobotMovement, shapes: Shapes) -> dict[str, Any]:
     """Times, joint positions [rad, m] and positions of the tip [m], rounded to a millionth."""
     trajectory = movement.trajectory
     sent = evenly_spaced(len(trajectory), MOST_SAMPLES)
-    tip = kinematics(movement.robot, trajectory.positions)[0]
     wanted = np.empty((0, 3)) if movement.path is None else movement.path.positions
     return {
-        "urdf": shapes.urdf,
-        "meshes": list(shapes.meshes),
-        "joints": shapes.joints,
-        "tip": shapes.tip,
+        **posture_data(movement.robot, shapes, trajectory.positions[sent]),
         "times": _rounded(trajectory.times[sent]),
-        "positions": _rounded(trajectory.positions[sent]),
         "steps": [_rounded(values[sent]) for values in trajectory.steps.values()],
-        "executed": _rounded(tip[sent]),
         "wanted": _rounded(wanted[evenly_spaced(len(wanted), MOST_SAMPLES)] if len(wanted) else wanted),
         "begins": round(movement.begins, 6),
-        "start": _rounded(tip[movement.first]),
+        "start": _rounded(kinematics(movement.robot, trajectory.positions[[movement.first]])[0][0]),
+    }
+
+
+def posture_data(robot: Robot, shapes: Shapes, joints: Array | None = None) -> dict[str, Any]:
+    """The same of joint positions (T, n) at no times; of an arm that stands at rest where there are none."""
+    positions = robot.rest[None] if joints is None else joints
+    tip = kinematics(robot, positions)[0]
+    return {
+        **{name: getattr(shapes, name) for name in ("urdf", "meshes", "joints", "tip")},
+        "positions": _rounded(positions),
+        "executed": _rounded(tip),
+        **{"times": [0.0], "steps": [], "wanted": [], "begins": 0.0},
+        "start": _rounded(tip[0]),
         "goal": _rounded(tip[-1]),
         "colors": {"executed": BLUE, "wanted": ORANGE, "approach": GRAY, "goal": GREEN},
     }
@@ -221,6 +232,8 @@ def shapes_of(robot: Robot) -> Shapes:
     for i, (name, link) in enumerate(links.items()):
         to = ElementTree.SubElement(arm, "link", name=link)
         shapes = drawn[name] if name not in bare else list(_cylinders(root, name))
+        if name in bare or robot.source.parent == FOLDER:
+            shapes = [part for shape in shapes for part in _limb_or_joint(shape)]
         for shape in shapes:
             set_color(shape, _GRAYS[i % 2])
         to.extend(shapes)
@@ -266,6 +279,34 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         shape = ElementTree.Element("cylinder", radius=as_text([radius]), length=as_text([length]))
         ElementTree.SubElement(visual, "geometry").append(shape)
         yield visual
+
+
+def _limb_or_joint(shape: Element) -> Iterator[Element]:
+    """Yield a cylinder without a color of its own with round ends, or a short one with colored caps."""
+    yield shape
+    cylinder = shape.find("geometry/cylinder")
+    if cylinder is None or shape.find("material") is not None:
+        return
+    origin = origin_of(shape)
+    radius, length = (float(cylinder.get(name, "0")) for name in ("radius", "length"))
+    roll, pitch, yaw = finite_numbers(origin.get("rpy"), 3)
+    is_limb = length > _LONG * radius
+    away = length / 2 - radius * is_limb  # from the middle of the cylinder to the middle of an end
+    if is_limb:
+        cylinder.set("length", as_text([2 * away]))
+    along = Rotation.from_euler("xyz", (roll, pitch, yaw)).apply([0.0, 0.0, away])
+    for side in (-1, 1):
+        end = ElementTree.Element("visual")
+        place = np.add(finite_numbers(origin.get("xyz"), 3), side * along).tolist()
+        ElementTree.SubElement(end, "origin", xyz=as_text(place), rpy=str(origin.get("rpy")))
+        geometry = ElementTree.SubElement(end, "geometry")
+        if is_limb:
+            ElementTree.SubElement(geometry, "sphere", radius=as_text([radius]))
+        else:
+            sizes = {name: as_text([radius * part]) for name, part in zip(("radius", "length"), _CAPS, strict=True)}
+            ElementTree.SubElement(geometry, "cylinder", sizes)
+            set_color(end, _CAP)
+        yield end
 
 
 class LinkShapes:

@@ -3,11 +3,11 @@
 /**
  * @param {Object<string, number>} least word -> the least confidence that it takes
  * @param {number} confidence
- * @param {{isNew: boolean, isGuess?: boolean, isOver?: boolean}} what
+ * @param {{isNew: boolean, isGuess?: boolean}} what
  * @returns {"sure"|"probably"|"looks like"|"new"}
  */
-export function certainty(least, confidence, { isNew, isGuess = false, isOver = true }) {
+export function certainty(least, confidence, { isNew, isGuess = false }) {
   if (isNew) return "new";
-  if (isGuess || !isOver || !(confidence >= least.probably)) return "looks like";
+  if (isGuess || !(confidence >= least.probably)) return "looks like";
   return confidence >= least.sure ? "sure" : "probably";
 }

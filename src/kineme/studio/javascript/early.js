@@ -1,7 +1,6 @@
 // A movement while it is under way: which stored one, how much of it, and what remains.
 
 import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js";
-import { certainty } from "./certainty.js";
 import { N_POINTS, smoothly } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
 import { beginnings } from "./hypotheses.js";
@@ -72,7 +71,7 @@ function decision(confidence, patience) {
  * @param {{confidence?: number, patience?: number}} [options]
  */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
-  const { classes, certainty: least, comparison: how, early } = stored.recognizer.header;
+  const { classes, comparison: how, early } = stored.recognizer.header;
   const { n_dims: d, cutoff, pauses } = how;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
@@ -104,7 +103,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const remaining = ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k]));
     return {
       label: decided === null ? null : classes[decided],
-      certainty: certainty(least, share[order[0]], { isNew: unknown > share[order[0]], isOver: false }),
+      certainty: unknown > share[order[0]] ? null : "looks like",
       ranked: order.map((c) => ({
         label: classes[c],
         confidence: share[c],

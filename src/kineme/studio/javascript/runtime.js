@@ -26,6 +26,8 @@ export function open(text) {
     formulations: header.movements.encodes ? Object.keys(FORMULATIONS) : [header.movements.formulation],
     /** The answer to a movement: times [s], positions of d numbers each. */
     recognize: (times, positions, errorRate) => recognize(all(), movement(times, positions, d), errorRate),
+    /** What recognizes. */
+    recognizer: all,
     /** A function that is given all samples so far, again and again, and says what they begin to be. */
     follow: (options) => follow(beginnings(), options),
     /** Learn a movement. */

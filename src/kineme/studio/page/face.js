@@ -21,8 +21,12 @@ const prototypes = backend.symbols().map((symbol) => symbol.path);
 const box = viewed();
 const canvas = byId("stage");
 const stage = new Stage(canvas, header.view, box, paint);
-const panel = new AnswerPanel({ advice: "Drag its start, its goal, or the path; or clear it and draw another." });
-const state = { ...NOTHING, held: null };
+const panel = new AnswerPanel({
+  picture: (name) => backend.symbols().find((symbol) => symbol.name === name)?.path ?? null,
+  advice: () =>
+    state.drags ? "Drag its start, its goal, or the path; or draw another." : "Draw another, or drag this one.",
+});
+const state = { ...NOTHING, drags: false, held: null }; // drags: another press does not draw
 const symbols = createSymbols(backend.symbols(), header.view, choose);
 const following = backend.follow((message) => {
   state.live = message.state ?? state.live;
@@ -51,25 +55,30 @@ function paint() {
   if (!moving || stroke) return;
   stage.line(moving.positions, "--ink");
   for (const [, x] of moving.via) stage.dot(x, "--predicted", { radius: 6 });
-  stage.dot(moving.start, "--ink", { hollow: true });
-  stage.dot(moving.goal, "--goal");
-  stage.word("start", moving.start, "--soft", moving.positions);
-  stage.word("goal", moving.goal, "--goal", moving.positions);
+  if (state.drags) {
+    stage.dot(moving.start, "--ink", { hollow: true });
+    stage.dot(moving.goal, "--goal");
+    stage.word("start", moving.start, "--soft", moving.positions);
+    stage.word("goal", moving.goal, "--goal", moving.positions);
+  }
   if (state.played !== null) stage.dot(moving.positions[state.played], "--predicted");
 }
 
 /** Show the state: in the drawing area at the next frame, in words at once. */
 function show() {
-  const { stroke, live, answer, moving, note } = state;
+  const { stroke, live, answer, moving, note, drags } = state;
   stage.board.draw();
   byId("hint").hidden = Boolean(stroke || moving || answer);
   byId("play").disabled = byId("save").disabled = !moving || Boolean(stroke);
   byId("clear").disabled = !moving && !answer;
+  byId("drag").hidden = drags || !moving;
+  byId("ranking").hidden = !stroke && !answer;
   if (stroke && live) panel.drawing(live, stroke.times.at(-1));
-  else if (answer) panel.final(answer);
+  else if (answer) panel.final(answer, () => backend.explain(state.drawn, answer));
   else {
     if (stroke) panel.words("", "…", "Go on drawing.", "open");
-    else if (moving) panel.words("", moving.name, "Drag its start, its goal, or the path itself.", "known");
+    else if (moving)
+      panel.words("", moving.name, "Drag its start, its goal, or the path itself.", "known", moving.name);
     else {
       const invitation = "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.";
       panel.words("", "What is it?", invitation, "open");
@@ -102,7 +111,7 @@ function movable(name, what, place) {
 }
 
 function choose(name) {
-  become(movable(name, { symbol: name }, placed(backend, name, box)));
+  become({ drags: true, ...movable(name, { symbol: name }, placed(backend, name, box)) });
   symbols.select(name);
   // In a narrow window what was chosen is above the list of what can be chosen.
   document.querySelector(".answer").scrollIntoView({ block: "nearest" });
@@ -117,7 +126,7 @@ function finish() {
     const { encodes } = header.movements;
     const name = encodes ? DRAWN : answer.label;
     const what = encodes ? { primitive: runtime.encode(drawn.times, drawn.positions) } : { symbol: name };
-    become({ answer, drawn, ...(name === null ? {} : movable(name, what, place)) });
+    become({ answer, drawn, drags: false, ...(name === null ? {} : movable(name, what, place)) });
   } catch {
     become({ note: "That was too short: draw a longer movement." });
   }
@@ -138,9 +147,15 @@ function moved(note = "") {
 
 const update = (change) => moved(state.moving?.update(change) ?? "");
 
+function startDragging() {
+  state.drags = true;
+  show();
+  canvas.focus({ preventScroll: true });
+}
+
 /** Take hold of a point of what moves. @param {PointerEvent} event */
 function hold(event) {
-  if (state.held || state.stroke) return;
+  if (state.held || state.stroke || !state.drags) return;
   state.played = null;
   const held = state.moving?.held(stage, placeOf(event)) ?? null;
   const go = (now) => {
@@ -182,6 +197,7 @@ function key(event) {
   if (event.key === "Escape") become({});
   else if (event.key === " ") play();
   else if (event.key in ARROWS && state.moving) {
+    startDragging();
     const part = event.shiftKey ? "start" : "goal";
     const step = STEP * canvas.clientHeight;
     const at = stage.project(state.moving[part]);
@@ -227,12 +243,13 @@ function start() {
   canvas.addEventListener("pointerdown", hold);
   followPointer(canvas, hearer);
   canvas.addEventListener("pointermove", (event) => {
-    if (!state.held && !state.stroke)
+    if (!state.held && !state.stroke && state.drags)
       canvas.classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
   });
   canvas.addEventListener("keydown", key);
   byId("clear").addEventListener("click", () => become({}));
   byId("play").addEventListener("click", play);
+  byId("drag").addEventListener("click", startDragging);
   byId("save").addEventListener("click", save);
   byId("formulation").addEventListener("change", () => update({ formulation: byId("formulation").value }));
   for (const id of ["turn", "tilt"])

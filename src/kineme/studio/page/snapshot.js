@@ -1,6 +1,7 @@
-// The library of a snapshot, in the four functions that the studio has of its server; see ../web/parts/server.js.
+// The library of a snapshot, in the five functions that the studio has of its server; see ../web/parts/server.js.
 
 import { open } from "../javascript/runtime.js";
+import { explain } from "./explanation.js";
 
 /**
  * @param {string} text of the snapshot
@@ -14,6 +15,7 @@ export function openSnapshot(text) {
     runtime,
     symbols: () => symbols,
     recognize: ({ times, positions }) => runtime.recognize(times, positions),
+    explain: (movement, answer) => explain(runtime.recognizer(), movement, answer),
     /** A state is computed when the page paints, of all samples so far; the answer is asked for. */
     follow: (hear) => {
       let [update, times, positions, frame] = [null, [], [], 0];

@@ -139,7 +139,7 @@ def _with_headers(send: Send, scope: Scope, host: str) -> Send:
     framed = scope["path"] == _FRAMED
     socket_of = f"ws://{host} wss://{host}" if all(mark.isalnum() or mark in ".-:[]" for mark in host) else ""
     policy = (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src 'self'; "
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; "
         f"font-src 'self'; connect-src 'self' {socket_of}; frame-src 'self'; manifest-src 'self'; base-uri 'none'; "
         f"form-action 'none'; frame-ancestors {chr(39)}{'self' if framed else 'none'}{chr(39)}"
     )

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from kineme.anchoring.proposals import Proposal
+from kineme.datasets.examples import load_example
 from kineme.errors import SpecificationError
 from kineme.library import proposals as stored
 from kineme.library.storage import changes, read
@@ -27,6 +28,13 @@ def learn(studio: Writes, body: NewMovement) -> dict[str, Any]:
     """One drawing is enough for a new symbol; a movement that is stored already gets the symbol if it has none."""
     recording = records.trajectory(body.times, body.positions)
     report = studio.library.learn([recording], [body.label], groups=[body.group])
+    return {"ids": report.ids.tolist(), "version": report.version}
+
+
+@router.post("/example", response_model=records.LearnedOut, summary="Learn an example: letters, gestures or arm")
+def learn_example(studio: Writes, body: ExampleRequest) -> dict[str, Any]:
+    """Into a library that holds nothing, or movements of as many dimensions."""
+    report = studio.library.learn(load_example(body.name))
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
@@ -103,6 +111,12 @@ class NewMovement(records.Change):
     positions: list[records.Point]
     label: records.Name | None = Field(None, description="Name of its symbol, which is made if needed.")
     group: records.Name | None = Field(None, description="Who showed it.")
+
+
+class ExampleRequest(records.RequestBody):
+    """An example by its name, see `kineme.datasets.load_example`."""
+
+    name: records.Name
 
 
 class UndoRequest(records.Change):

@@ -10,8 +10,9 @@ from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError
 from kineme.studio.server import records
+from kineme.studio.server.importing import command
 from kineme.studio.server.opened import KEY, Lane, Opened, OpenedRecordings
-from kineme.studio.server.recording_routes import PlotOut, Span, SpannedOut, UploadOut, plot_of, table_of
+from kineme.studio.server.recording_routes import FoundSpan, PlotOut, SpannedOut, UploadOut, plot_of, table_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Writes
 
@@ -61,13 +62,6 @@ class EpisodeDetail(UploadOut):
     episode: EpisodeOut
     videos: list[VideoOut]
     chosen: list[str] = Field(description="Channels of the feature that is read by default.")
-
-
-class FoundSpan(Span):
-    """A stretch with how sure its name is, unless a person gave it."""
-
-    p: records.Number | None = None
-    confidence: records.Number | None = None
 
 
 class SpansRequest(records.RequestBody):
@@ -150,7 +144,8 @@ def save(studio: Writes, body: SaveRequest) -> dict[str, Any]:
 async def episode(studio: Reads, key: EpisodeKey, width: Width = 1000) -> dict[str, Any]:
     """Its signals, thinned to a width, its channels and videos; `/api/recordings/{key}` searches and learns it."""
     opened = _opened(studio)
-    return await studio.reading(_detail, opened, key, width)
+    shown = await studio.reading(_detail, opened, key, width)
+    return shown | {"command": command(opened.name, str(studio.library.folder), {})}
 
 
 @router.get("/{key}/strip", response_model=PlotOut, summary="The signals of an episode as a strip")

@@ -1,13 +1,15 @@
 """Read a file that somebody sent, in a process of its own with little memory, which can be ended.
 
 Run as ``python -m kineme.studio.server.read_upload FILE RESULT BYTES SECONDS``, with the options of the reader as JSON
-on the standard input. The result is an archive of plain arrays and JSON, or the text of a refusal.
+on the standard input. The result is an archive of plain arrays and JSON, or the text of a refusal; beside it lies what
+`table_preview` returns.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from kineme.io.records import Problem
 from kineme.movements.channels.channel import channels_from_data, channels_to_data
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels
+from kineme.studio.server.importing import array_preview, table_preview
 
 REFUSED = 3  # exit code
 _ARRAYS = ("offsets", "durations", "stamps")
@@ -83,11 +86,17 @@ def main() -> None:
     path, result, beyond, seconds = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     options = json.load(sys.stdin)
     _limit(beyond, seconds)
+    preview = None
+    with suppress(KinemeError, MemoryError):
+        preview = table_preview(path)
     try:
         save(read_recordings(path, **options), result)
     except (KinemeError, MemoryError) as error:
         result.write_text(str(error) or "expected a file that fits into memory, got a larger one", encoding="utf-8")
+        preview = preview or array_preview(path)
         sys.exit(REFUSED)
+    finally:
+        result.with_suffix(".json").write_text(json.dumps(preview), encoding="utf-8")
 
 
 if __name__ == "__main__":

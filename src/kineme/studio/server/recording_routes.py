@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from shutil import rmtree
 from typing import Annotated, Any
+from urllib.parse import quote
 
+import numpy as np
 from fastapi import APIRouter, Header, Request
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
+from starlette.background import BackgroundTask
 
-from kineme.errors import SpecificationError
+from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
+from kineme.io.writing.annotations import WRITERS, Annotation, write_annotations
+from kineme.io.writing.rerun import points_in, recording_scenes, write_rerun
 from kineme.library.annotate import annotate
 from kineme.library.learn import learn_recordings
+from kineme.recognition.answer import certainty
+from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
+from kineme.studio.server.importing import command, reader_options, unclear
 from kineme.studio.server.opened import columns_of, movement_of
-from kineme.studio.server.refusals import in_studio_words
+from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
-from kineme.studio.server.uploads import go_on
+from kineme.studio.server.uploads import go_on, plain_name
 
 
 class ChannelChoice(records.Change):
@@ -73,12 +85,54 @@ class TableOut(BaseModel):
 
 
 class UploadOut(BaseModel):
-    """The contents of a file."""
+    """The contents of a file; it has no tables where somebody has to say first how it is read."""
 
     recording: str
     tables: list[TableOut]
     problems: list[str]
     plots: list[PlotOut] = Field(description="One of each table.")
+    preview: dict[str, Any] | None = Field(None, description="First rows, and guesses at how they are read.")
+    unclear: str = Field("", description="Why somebody should say how it is read.")
+    command: str = Field(description="Of the shell, that finds movements in the file as it was read.")
+
+
+class ReadRequest(records.RequestBody):
+    """How a table is read."""
+
+    time: records.Text | None = Field(None, description="Column of the times.")
+    units: Annotated[str, Field(max_length=20)] | None = Field(None, description="Of the times.")
+    rate: records.Number | None = Field(None, gt=0, description="Samples a second, where there are no times.")
+    columns: list[records.Text] = Field(min_length=1, max_length=1000)
+    measured_in: Annotated[str, Field(max_length=20)] | None = Field(None, description="Unit of the coordinates.")
+
+
+class ShapesRequest(ChannelChoice):
+    """Stretches of one table whose shapes are drawn, each by at most so many points."""
+
+    spans: list[Span] = Field(max_length=10_000)
+    points: int = Field(64, ge=2, le=2000)
+
+
+class ShapeOut(BaseModel):
+    """A path in the plane or in space, and the seconds since the first sample at which it is at its points."""
+
+    times: list[float]
+    path: records.Points
+
+
+class FoundSpan(Span):
+    """A stretch with how sure its name is, unless a person gave it."""
+
+    p: records.Number | None = None
+    confidence: records.Number | None = None
+    certainty: records.Text | None = None
+
+
+class AnnotationsRequest(ChannelChoice):
+    """Annotations of one table, and the format in which they are written."""
+
+    spans: list[FoundSpan] = Field(max_length=10_000)
+    format: str = Field("csv", max_length=20)
 
 
 class RestOut(BaseModel):
@@ -94,6 +148,7 @@ class SpannedOut(RestOut):
     label: str | None
     p: float | None
     confidence: float | None
+    certainty: str | None = Field(None, description="sure, probably, looks like or new; null where nobody said it.")
 
 
 class SpottedOut(BaseModel):
@@ -111,6 +166,9 @@ class SearchedOut(BaseModel):
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
+#: Format of annotations that is a file of its own -> its ending.
+_ENDINGS = {name: writer.endings[0] for name, writer in WRITERS.items() if writer.copies is None} | {"rerun": ".rrd"}
+_MOST_POINTS = 1_000_000  # of all shapes that are asked for at once
 _PLOTTED = 1000  # samples of a column, at most
 
 
@@ -128,16 +186,95 @@ async def send(
     ] = "recording.csv",
 ) -> dict[str, Any]:
     """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
-    key = await studio.uploads.receive(x_file_name, request.stream())
-    work = Work()
-    async with studio.uploads.readers:
-        read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
-    return {
-        "recording": key,
-        "tables": [table_of(read, k) for k in range(len(read))],
-        "problems": [in_studio_words(str(problem)) for problem in read.problems],
-        "plots": [plot_of(read, k) for k in range(len(read))],
+    return await _received(studio, request, await studio.uploads.receive(x_file_name, request.stream()))
+
+
+@router.post("/{key}/read", response_model=UploadOut, summary="Say how a table is read")
+async def read_as(studio: Reads, request: Request, key: records.RecordingKey, body: ReadRequest) -> dict[str, Any]:
+    """The file that was sent, with these columns and this unit of time or this rate from now on."""
+    preview = studio.uploads.previews.get(key)
+    if preview is None:
+        raise MissingError("expected a table of text that was sent, got another recording")
+    return await _received(studio, request, key, reader_options(preview, body.model_dump()))
+
+
+async def _received(
+    studio: Studio, request: Request, key: str, options: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Read a file that was sent, with the options that somebody chose; one that is not clear is described alone."""
+    work, uploads = Work(), studio.uploads
+
+    def act() -> Recordings:
+        return uploads.recordings(key, (), work.check) if options is None else uploads.read_as(key, options, work.check)
+
+    read: Recordings | str
+    async with uploads.readers:
+        try:
+            read = await while_wanted(request, studio.long, work, act)
+        except DataError as error:
+            if options is not None or uploads.previews.get(key) is None:
+                raise
+            read = in_studio_words(str(error))
+    preview, n = uploads.previews.get(key), 0 if isinstance(read, str) else len(read)
+    about: dict[str, Any] = {"recording": key, "tables": [], "plots": [], "problems": [], "preview": preview}
+    if not isinstance(read, str):
+        about["tables"], about["plots"] = ([act(read, k) for k in range(n)] for act in (table_of, plot_of))
+        about["problems"] = [in_studio_words(str(problem)) for problem in read.problems]
+    return about | {
+        "unclear": unclear(preview, read) if options is None else "",
+        "command": command(uploads.path(key).name, str(studio.library.folder), uploads.options.get(key, {})),
     }
+
+
+@router.post("/{key}/shapes", response_model=list[ShapeOut], summary="The shapes of stretches of a recording")
+def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> list[dict[str, Any]]:
+    """Each path by the coordinates of the first point among the channels, or else by the first three columns."""
+    read = _read(studio, key)
+    rows = slice(*read.demonstrations.offsets[(k := _number(read, body.table)) : k + 2])
+    demos, names = read.demonstrations, columns_of(read)
+    chosen = [name for name in _columns_of(read, body.channels or names) if name in names]
+    values = (demos.positions if demos.channels is None else demos.recorded)[rows][:, [*map(names.index, chosen)]]
+    times = demos.movements.stamps[rows] - demos.movements.stamps[rows.start]
+    points = next(iter(points_in(chosen, values).values()), values[:, :3])
+    ends = np.array([(span.begin, span.end) for span in body.spans]).reshape(-1, 2)
+    drawn = []
+    for first, end in zip(times.searchsorted(ends[:, 0]), times.searchsorted(ends[:, 1], "right"), strict=True):
+        n = min(body.points, _MOST_POINTS // len(ends))
+        shown = first + evenly_spaced(max(end - first, 0), n) if end > first else np.zeros(0, np.intp)
+        drawn.append(
+            {"times": times[shown].tolist(), "path": records.thumbnail(points[shown], n) if len(shown) else []}
+        )
+    return drawn
+
+
+@router.post(
+    "/{key}/annotations",
+    summary="Annotations as a file",
+    response_class=FileResponse,
+    responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
+)
+def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
+    """Write stretches and their names as `kineme annotate` does, in each of its formats that is a file of its own."""
+    if body.format not in _ENDINGS:
+        raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
+    recording = _one(studio, key, body)
+    source, origin = recording.sources[0], float(recording.demonstrations.movements.stamps[0])
+    notes = [
+        Annotation(
+            *(source.path, source.place, origin + span.begin, origin + span.end, span.label),
+            *(math.nan if span.p is None else span.p, 1.0 if span.confidence is None else span.confidence, origin),
+        )
+        for span in sorted(body.spans, key=lambda span: span.begin)
+    ]
+    folder = studio.uploads.new_folder()
+    name = plain_name(f"{source.path} {source.place}".strip()).replace(".", "_")
+    path = folder / f"{name}-labels{_ENDINGS[body.format]}"
+    if body.format == "rerun":
+        write_rerun(path, recording_scenes(recording, notes))
+    else:
+        write_annotations(path, notes, [Path(source.path)], body.format)
+    headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(path.name)}"}
+    return FileResponse(path, headers=headers, background=BackgroundTask(rmtree, folder, ignore_errors=True))
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
@@ -159,6 +296,7 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
             {
                 **{"begin": each.span[0], "end": each.span[1], "label": each.symbol},
                 **{"p": records.numbers(each.p_value), "confidence": records.numbers(each.confidence)},
+                "certainty": certainty(each.confidence, is_new=each.unknown, is_guess=not report.calibrated),
             }
             for each in report.annotations
         ]
@@ -214,12 +352,16 @@ def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[
 
 def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
     """Read one table of a file, in the same columns."""
-    read, table = _in_columns(studio, key, body, check), body.table
+    read = _in_columns(studio, key, body, check)
+    return movement_of(read, _number(read, body.table))
+
+
+def _number(read: Recordings, table: str | None) -> int:
+    """Return which movement of a file has that name; by default the first."""
     names = [_name(read, k) for k in range(len(read))]
-    k = 0 if table is None else names.index(table) if table in names else -1
-    if k < 0:
+    if table is not None and table not in names:
         raise SpecificationError(f"expected one of the tables {', '.join(names[:20])}, got {table!r}")
-    return movement_of(read, k)
+    return 0 if table is None else names.index(table)
 
 
 def _name(read: Recordings, k: int) -> str:

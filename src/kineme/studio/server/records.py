@@ -82,11 +82,11 @@ def trajectory(times: list[float], positions: list[list[float]]) -> Trajectory:
     return Trajectory(np.array(times, dtype=np.float64), np.array(positions, dtype=np.float64))
 
 
-def thumbnail(positions: ArrayLike) -> Any:
-    """At most 64 points of a path, its first and last among them."""
+def thumbnail(positions: ArrayLike, n: int = _THUMBNAIL) -> Any:
+    """Return at most n points of a path, its first and last among them."""
     path = np.asarray(positions, dtype=np.float64)
     digits = _DIGITS - 1 - int(np.floor(np.log10(np.abs(path).max() or 1.0)))
-    return numbers(np.round(path[evenly_spaced(len(path), _THUMBNAIL)], digits))
+    return numbers(np.round(path[evenly_spaced(len(path), n)], digits))
 
 
 def envelope(times: Array, values: Array, width: int) -> tuple[Array, Array]:

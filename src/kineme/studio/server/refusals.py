@@ -29,6 +29,8 @@ _WORDS = tuple(
     (re.compile(library), studio)
     for library, studio in (
         (_CHANNELS, "choose other channels"),
+        (r"save np\.moveaxis\(array, 1, 2\), of one movement array\.T", "turn the array before it is saved"),
+        (r"labels\.astype\(str\)", "plain text"),
         (
             r"choose columns, or say that it is a movement of the joints \(joints=True, --joints\)",
             "make a library of movements in the plane or in space; if these move the joints of an arm, execute them in "

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
 from fastapi import APIRouter
+from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from kineme.errors import KinemeError, SpecificationError
-from kineme.robots.execution.preflight import Preflight, checks_as_data
+from kineme.io.writing.write_movement import WRITERS
+from kineme.robots.execution.preflight import Preflight, checks_as_data, preflight_table
+from kineme.robots.export_files import write_action_goal, write_bag, write_joints
+from kineme.robots.kinematics.descent import InverseKinematics, descend
 from kineme.robots.models.robot import MODELS, Robot, load
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
-from kineme.robots.planning.robot_movement import InfeasibleError
+from kineme.robots.planning.robot_movement import InfeasibleError, RobotMovement
 from kineme.robots.planning.roles import space_of
-from kineme.robots.view.write_view import scene_data, shapes_of
-from kineme.studio.server.records import Number, Point, Text, numbers
+from kineme.robots.view.write_view import posture_data, scene_data, shapes_of
+from kineme.studio.server.records import Number, Point, RequestBody, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
-from kineme.studio.server.rollout_routes import PrimitiveRequest, learned_as
-from kineme.studio.server.studio import Reads
+from kineme.studio.server.rollout_routes import PrimitiveRequest, as_file, learned_as, name_of
+from kineme.studio.server.studio import Reads, Studio
+
+_ROS = {".yaml": write_action_goal, ".mcap": write_bag, ".bag": write_bag}  # beside the writers of tables
+_STEPS = 6  # towards the hand, from where the arm stands
+_REACH = 0.4  # of the distance of the tip at rest: half of the square that the hand moves in
 
 
 class ArmsOut(BaseModel):
@@ -44,6 +55,7 @@ class MoveRequest(PrimitiveRequest):
     size: Number | None = Field(None, gt=0)
     plane: Literal["xy", "xz", "yz"] = "xy"
     slow_down: bool = False
+    shapes: bool = Field(True, description="Whether the scene has the shapes of the arm, with meshes many megabytes.")
 
 
 class CheckOut(BaseModel):
@@ -72,10 +84,32 @@ class MoveOut(BaseModel):
     passed: bool
     refusal: str | None
     checks: list[CheckOut]
+    table: list[list[str]] = Field(description="The checks in words: check, worst, limit, unit, at [s], result.")
     unchecked: list[str]
     assumed: list[str]
     joints: list[JointOut]
     scene: dict[str, Any] | None
+
+
+class SaveRequest(MoveRequest):
+    """The same as a file of the joints."""
+
+    format: Text = Field(description=f"One of {', '.join([*WRITERS, *_ROS])}.")
+
+
+class FollowRequest(RequestBody):
+    """Where a hand is, across and up from -1 to 1, and where the joints stand; without them the arm stands at rest."""
+
+    robot: Text
+    hand: list[Number] = Field(min_length=2, max_length=2)
+    joints: Point | None = None
+
+
+class FollowOut(BaseModel):
+    """Joints whose tip is where the hand is, and its distance from there [m]: more than 0 out of reach."""
+
+    joints: list[float]
+    distance: float
 
 
 router = APIRouter(prefix="/api/robots", tags=["robots"])
@@ -91,12 +125,73 @@ def robots(studio: Reads) -> dict[str, Any]:
     return {"available": True, "why": None, "robots": list(MODELS)}
 
 
+@router.get("/{name}", response_model=MoveOut, summary="An arm at rest")
+def at_rest(studio: Reads, name: Text) -> dict[str, Any]:
+    """What draws it before it has moved."""
+    robot = _arm(name)
+    return {**_answer(robot, None), "refusal": None, "scene": posture_data(robot, shapes_of(robot))}
+
+
 @router.post("/move", response_model=MoveOut, summary="What an arm does to execute a movement")
 def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
     """Joints, and every check; a movement that must not be executed is refused, with how it could be."""
-    if body.robot not in MODELS:  # clients name no files
-        raise SpecificationError(f"expected one of the arms {', '.join(MODELS)}, got {body.robot[:80]!r}")
-    robot = load(body.robot)
+    robot = _arm(body.robot)
+    try:
+        result = _planned(studio, body, robot)
+    except InfeasibleError as error:
+        return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
+    scene = scene_data(result, shapes_of(robot))
+    if not body.shapes:
+        scene |= {"urdf": "", "meshes": []}
+    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene}
+
+
+@router.post(
+    "/export",
+    summary="What is sent to an arm, as a file",
+    response_class=Response,
+    responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
+)
+def export(studio: Reads, body: SaveRequest) -> Response:
+    """Joints over time as a table, an action goal of ROS 2 (.yaml) or a bag; nothing that must not be executed."""
+    ending = f".{body.format.lower().lstrip('.')}"
+    if ending not in {**WRITERS, **_ROS}:
+        raise SpecificationError(f"expected one of the formats {', '.join({**WRITERS, **_ROS})}, got {ending[:20]!r}")
+    trajectory = _planned(studio, body, _arm(body.robot)).trajectory
+    with TemporaryDirectory() as folder:
+        path = _ROS.get(ending, write_joints)(Path(folder) / f"joints{ending}", trajectory)
+        return as_file(path.read_bytes(), f"{name_of(studio, body.what)} on {body.robot}", ending)
+
+
+@router.post("/follow", response_model=FollowOut, summary="An arm whose tip follows a hand")
+def follow(studio: Reads, body: FollowRequest) -> dict[str, Any]:
+    """In an upright square about where the tip is at rest; nothing of it is checked, and nothing is sent to an arm."""
+    robot, costs, position, rotation = _follower(body.robot)
+    joints = robot.rest if body.joints is None else np.array(body.joints)
+    if joints.shape != robot.rest.shape:
+        raise SpecificationError(f"expected {robot.n_joints} joints of {robot.name}, got {len(joints)}")
+    across, up = np.clip(body.hand, -1.0, 1.0) * _REACH * np.linalg.norm(position)
+    joints = np.clip(joints, robot.lower, robot.upper)[None]
+    reached = descend(robot, joints, np.add(position, [0.0, across, up]), rotation[None], costs, _STEPS)
+    return {"joints": numbers(reached.joints[0]), "distance": float(reached.errors[0])}
+
+
+def _arm(name: str) -> Robot:
+    """Load an arm that comes with kineme: clients name no files."""
+    if name not in MODELS:
+        raise SpecificationError(f"expected one of the arms {', '.join(MODELS)}, got {name[:80]!r}")
+    return load(name)
+
+
+@lru_cache(maxsize=len(MODELS))
+def _follower(name: str) -> tuple[Robot, Any, Any, Any]:
+    """Return an arm, its costs of turning, and position and rotation of its tip at rest."""
+    ik = InverseKinematics(_arm(name))
+    return ik.robot, ik.costs, ik.tip_position, ik.tip_rotation
+
+
+def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
+    """Plan the movement that is asked for; raise `InfeasibleError` where it must not be executed."""
     learned = learned_as(studio, body)
     space = space_of(learned.primitive.channels, learned.example, robot)
     if body.goal is not None and body.at is None and space != "joints":
@@ -112,20 +207,16 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
         joints=robot if space == "joints" else None,
         plane=body.plane,
     )
-    try:
-        result = move_arm(
-            generated.movement,
-            robot,
-            space=space,
-            plane=body.plane,
-            place="as given" if body.at is not None or space == "joints" else "free",
-            timing="slowed" if body.slow_down else "generated",
-            steps=generated.steps,
-            continuous=generated.continuous,
-        )
-    except InfeasibleError as error:
-        return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
-    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene_data(result, shapes_of(robot))}
+    return move_arm(
+        generated.movement,
+        robot,
+        space=space,
+        plane=body.plane,
+        place="as given" if body.at is not None or space == "joints" else "free",
+        timing="slowed" if body.slow_down else "generated",
+        steps=generated.steps,
+        continuous=generated.continuous,
+    )
 
 
 def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
@@ -133,6 +224,7 @@ def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
     return {
         "passed": preflight is not None and preflight.passed,
         "checks": [] if preflight is None else checks_as_data(preflight),
+        "table": [] if preflight is None else [list(row) for row in preflight_table(preflight).rows],
         "unchecked": [] if preflight is None else list(preflight.unchecked),
         "assumed": list(robot.assumed),
         "joints": [{"name": name, "low": low, "high": high} for name, low, high in joints],

@@ -11,7 +11,6 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field, model_validator
 
-from kineme.dmp.control.plan import ObstacleAvoidance
 from kineme.dmp.generation.generate import Generated, Learned, MovementOptions, generate, learn_one
 from kineme.dmp.styles.model import StyleModel, learn_styles
 from kineme.errors import SpecificationError, heard_warnings
@@ -26,7 +25,11 @@ from kineme.validation import Array
 recognition_router = APIRouter(prefix="/api", tags=["recognition"])
 
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
-_STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
+_MOST_BENDS = 24  # around obstacles
+_MARGIN = 0.1  # of the radius of an obstacle, by which the movement passes it
+_SAME_BEND = 0.05  # share of the duration within which a bend around an obstacle replaces another one, and goes
+_WIDER = 1.5  # times as far beside it
+_CENTERED = 1e-3  # of the radius: as near to the middle of an obstacle a path has no side
 
 
 def learned_as(studio: Studio, body: PrimitiveRequest) -> Learned:
@@ -58,9 +61,21 @@ def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
         meet_goal=True,  # it ends where the hand put it
         via=tuple((share, np.array(point)) for share, point in sorted(body.via, key=lambda pair: pair[0])),
     )
-    with heard_warnings() as heard:
-        movement, touched = _around(learned, options, body.obstacles)
-    return movement, list(dict.fromkeys([*heard, *touched]))
+    return _around(learned, options, body.obstacles)
+
+
+def name_of(studio: Studio, what: Subject) -> str:
+    """Return the name of the symbol that moves, or the number of the movement."""
+    symbol = what.symbol or (what.style.symbol if what.style else None)
+    return studio.symbol(symbol).name if symbol else f"movement {what.movement}"
+
+
+def as_file(data: bytes, name: str, ending: str) -> Response:
+    """Answer with a file: letters and digits of its name, whatever alphabet they are of."""
+    plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
+    ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
+    saved_as = f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
+    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
 
 
 def moving_positions(learned: Learned, movement: Generated) -> Array:
@@ -88,29 +103,74 @@ def _learned(studio: Studio, what: Subject, formulation: str | None) -> Learned:
 
 
 def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -> tuple[Generated, list[str]]:
-    """Steer the movement around balls as strongly as it takes; return warnings of those that it touches."""
+    """Bend the movement around balls; return warnings of those that it touches.
+
+    Where the path lies deepest in a ball it gets a via point outside that ball, until it is clear of all. Each changes
+    the weights as little as possible, and the via points that are asked for are met exactly.
+    """
     if not balls:
-        return generate(learned, options), []
-    centers, radii = [ball.center for ball in balls], np.array([ball.radius for ball in balls])
-    if len({len(center) for center in centers}) > 1:
+        with heard_warnings() as heard:
+            return generate(learned, options), heard
+    if len({len(ball.center) for ball in balls}) > 1:
         raise SpecificationError("expected obstacles of equally many dimensions")
     # Columns that are no part of an orientation have a velocity of the same name.
-    points, placed = np.array(centers), [k for k, name in enumerate(learned.moving_columns) if name in learned.rates]
-    if points.shape[1] == len(learned.moving_columns):  # a point of the movement: an orientation says nothing of where
-        points = points[:, placed]
-    for stronger in _STRONGER:
-        avoidance = ObstacleAvoidance(gamma=1000.0 * stronger)
-        movement = generate(learned, replace(options, obstacles=points, avoidance=avoidance))
-        path = moving_positions(learned, movement)[:, placed][:, : points.shape[1]]
-        gaps = np.linalg.norm(path[:, None] - points, axis=2).min(axis=0) - radii
-        if (gaps >= 0).all():
-            return movement, []
-    return movement, [
-        f"the movement passes {gap + radius:.3g} from the middle of obstacle {k + 1}, whose radius is {radius:.3g}: "
-        "move the obstacle, or add a via point beside it"
-        for k, (gap, radius) in enumerate(zip(gaps.tolist(), radii.tolist(), strict=True))
-        if gap < 0
+    placed = [k for k, name in enumerate(learned.moving_columns) if name in learned.rates]
+    centers, radii = np.array([ball.center for ball in balls]), np.array([ball.radius for ball in balls])
+    if centers.shape[1] == len(learned.moving_columns):  # a point of the movement: an orientation says nothing of where
+        centers = centers[:, placed]
+    if not 2 <= len(placed) == centers.shape[1]:
+        raise SpecificationError(
+            f"expected obstacles in the {len(placed)} dimensions of the movement, two or more, got {centers.shape[1]}"
+        )
+
+    def attempt(bends: dict[float, Array]) -> tuple[Generated, list[str], Array, Array]:
+        with heard_warnings() as heard:
+            via = sorted([*options.via, *bends.items()], key=lambda pair: pair[0])
+            movement = generate(learned, replace(options, via=tuple(via)))
+        path = moving_positions(learned, movement)
+        return movement, heard, path, radii - np.linalg.norm(path[:, None, placed] - centers, axis=2)
+
+    bends: dict[float, Array] = {}
+    owners, margins = dict[float, int](), np.full(len(balls), _MARGIN)
+    best = movement = attempt(bends)
+    # Around a ball in which a point of the movement lies there is no way: it is said alone.
+    fixed = np.array([best[2][0], best[2][-1], *(point for _, point in options.via)])[:, None, placed]
+    passable = (np.linalg.norm(fixed - centers, axis=2) > radii).all(axis=0)
+    for _ in range(_MOST_BENDS):
+        path, depths = movement[2], np.where(passable, movement[3], -np.inf)
+        if depths.max() <= 0:
+            break
+        t, ball = (int(k) for k in np.unravel_index(depths.argmax(), depths.shape))
+        share, point = t / (len(path) - 1), path[t].copy()
+        for other in [other for other in bends if owners[other] == ball and abs(other - share) < _SAME_BEND]:
+            del bends[other]
+            margins[ball] *= _WIDER
+        point[placed] = _beside(path[:, placed], t, centers[ball], radii[ball] * (1 + margins[ball]))
+        bends[share], owners[share] = point, ball
+        try:
+            movement = attempt(bends)
+        except SpecificationError:  # more bends than there are weights
+            break
+        if movement[3][:, passable].max() < best[3][:, passable].max():
+            best = movement
+    return best[0], best[1] + [
+        f"the movement passes {radius - depth:.3g} from the middle of obstacle {k + 1}, whose radius is {radius:.3g}: "
+        "move the obstacle, or the point that lies in it"
+        for k, (depth, radius) in enumerate(zip(best[3].max(axis=0).tolist(), radii.tolist(), strict=True))
+        if depth > 0
     ]
+
+
+def _beside(path: Array, t: int, center: Array, distance: float) -> Array:
+    """A place so far from a center, from where the path (T, d) is at sample t straight away from the center."""
+    along = path[min(t + 1, len(path) - 1)] - path[max(t - 1, 0)]
+    along = along / (np.linalg.norm(along) or 1.0)
+    away = path[t] - center
+    away = away - along * (along @ away)
+    if np.linalg.norm(away) < _CENTERED * distance:  # through the middle: to one side
+        away = np.eye(len(along))[np.abs(along).argmin()]
+        away = away - along * (along @ away)
+    return np.asarray(center + away * distance / np.linalg.norm(away))
 
 
 class Style(records.RequestBody):
@@ -255,13 +315,7 @@ def export(studio: Reads, body: ExportRequest) -> Response:
     movement, _ = make(studio, body)
     ending = f".{body.format.lower().lstrip('.')}"
     data = encode_movement(movement.columns, ending, movement.names)
-    symbol = body.what.symbol or (body.what.style.symbol if body.what.style else None)
-    name = studio.symbol(symbol).name if symbol else f"movement {body.what.movement}"
-    # Letters and digits of the name, whatever alphabet they are of.
-    plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
-    ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
-    saved_as = f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"
-    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": saved_as})
+    return as_file(data, name_of(studio, body.what), ending)
 
 
 class RecognizeRequest(records.RequestBody):
@@ -318,3 +372,36 @@ class AnswerOut(BaseModel):
 def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     """Its symbol, or null for unknown; with p-values that are calibrated where there are enough demonstrations."""
     return studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate).to_dict()
+
+
+class OverlayOut(BaseModel):
+    """An example laid over the movement, see `kineme.recognition.explanation.Overlay`."""
+
+    label: str
+    similarity: float
+    largest_difference: float
+    start: float = Field(validation_alias="from", serialization_alias="from")
+    to: float
+    part: str | None
+    differences: list[float]
+    path: list[list[float]]
+
+
+class WhyOut(BaseModel):
+    """Why a movement got its answer, as `kineme.recognition.explanation.Explanation.to_dict` gives it."""
+
+    answer: str
+    in_words: str
+    by_convolutions: bool
+    columns: list[str]
+    path: list[list[float]]
+    nearest: OverlayOut
+    runner_up: OverlayOut | None
+    shares: dict[str, float]
+
+
+@recognition_router.post("/why", response_model=WhyOut, summary="Explain the answer to a whole movement")
+def explain(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
+    """The movement over its nearest example and over the runner-up, as `kineme why` draws it."""
+    movement = records.trajectory(body.times, body.positions)
+    return studio.library.recognize(movement, body.error_rate).explain().to_dict()

@@ -16,8 +16,9 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import TemporaryDirectory, gettempdir, mkdtemp
 from threading import Lock
+from typing import Any
 from urllib.parse import unquote
 
 from kineme.errors import DataError
@@ -49,6 +50,8 @@ class Uploads:
         self.readers = asyncio.Semaphore(_READERS)
         self._folder = OwnFolder()
         self._files: dict[str, Path] = {}
+        self.options: dict[str, dict[str, Any]] = {}  # of the reader, where a person chose them for a file
+        self.previews: dict[str, dict[str, Any] | None] = {}  # see `table_preview`
         self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the chosen columns
         self._turn = Lock()
 
@@ -77,6 +80,7 @@ class Uploads:
             self._files[key] = path
             for old in list(self._files)[:-_MOST_FILES]:
                 shutil.rmtree(self._files.pop(old).parent, ignore_errors=True)
+                self.options.pop(old, None), self.previews.pop(old, None)
                 for which in [which for which in self._read if which[0] == old]:
                     self._read.pop(which)
         return key
@@ -86,21 +90,41 @@ class Uploads:
 
         `check` is called again and again, and raises where nobody waits any more.
         """
-        path, chosen = self._files.get(key), tuple(columns)
-        if path is None:
-            raise MissingError(
-                f"expected one of the last {_MOST_FILES} recordings that were sent, got another; send it again"
-            )
+        path, chosen, options = self.path(key), tuple(columns), self.options.get(key, {})
         read = self._read.get((key, chosen))
         if read is None:
-            read = self._read_apart(path, {"columns": list(chosen)} if chosen else {}, check)
+            read = self._read_apart(path, {**options, "columns": list(chosen)} if chosen else options, check)
             with self._turn:
-                if key in self._files:  # of each file it is kept as it is, and in the columns chosen last
+                # Of each file it is kept as it is, and in the columns chosen last.
+                if key in self._files and options == self.options.get(key, {}):
                     for old in [which for which in self._read if which[0] == key and which[1] and chosen]:
                         self._read.pop(old)
                     self._read[key, chosen] = read
                 while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
                     self._read.pop(next(iter(self._read)))
+        return read
+
+    def path(self, key: str) -> Path:
+        """Return the file that was sent; a MissingError if it is forgotten."""
+        if (path := self._files.get(key)) is None:
+            raise MissingError(
+                f"expected one of the last {_MOST_FILES} recordings that were sent, got another; send it again"
+            )
+        return path
+
+    def new_folder(self) -> Path:
+        """Make an empty folder that is deleted with all others when the studio ends."""
+        return Path(mkdtemp(dir=self._folder.path))
+
+    def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = go_on) -> Recordings:
+        """Read a file with options of the reader from now on; where they are refused, it is read as before."""
+        read = self._read_apart(self.path(key), options, check)
+        with self._turn:
+            if key in self._files:
+                self.options[key] = options
+                for old in [which for which in self._read if which[0] == key]:
+                    self._read.pop(old)
+                self._read[key, ()] = read
         return read
 
     def _read_apart(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
@@ -110,6 +134,8 @@ class Uploads:
         remedy = "send a part of it, or learn it with kineme learn"
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
+            if (preview := result.with_suffix(".json")).exists():
+                self.previews[path.parent.name] = json.loads(preview.read_text(encoding="utf-8"))
             if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
             if code:
@@ -122,7 +148,8 @@ class Uploads:
             within = f"expected a recording that is read within {self.seconds:g} s"
             raise DataError(f"{within}, {path.name} takes longer; {remedy}") from None
         finally:
-            result.unlink(missing_ok=True)
+            for file in (result, result.with_suffix(".json")):
+                file.unlink(missing_ok=True)
 
 
 def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:

@@ -1,21 +1,51 @@
 // The page's script: time moves the arm, the trace of its tip, and the cursors of the charts.
 (() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
+  /** @type {any} What is shown. */
+  let data = null;
   const byId = (id) => document.getElementById(id);
   const [play, now, canvas] = ["play", "now", "canvas"].map(byId);
   const reset = /** @type {HTMLButtonElement} */ (byId("reset"));
   const slider = /** @type {HTMLInputElement} */ (byId("time"));
   const speed = /** @type {HTMLSelectElement} */ (byId("speed"));
-  const times = data.times;
-  const duration = times[times.length - 1];
-  const charts = [...document.querySelectorAll(".chart")].map((chart) => ({
-    cursor: chart.querySelector(".cursor"),
-    output: chart.querySelector("output"),
-    width: chart.querySelector("svg").viewBox.baseVal.width,
-  }));
-  const view = sceneOrNothing();
+  let times = [0];
+  let duration = 0;
+  let charts = [];
   let time = 0;
   let last = null; // when the page was drawn last, while it plays
+  const api = Object.assign(window, {
+    kineme: {
+      load,
+      show,
+      pose,
+      play: () => setPlaying(true),
+      moved: null,
+      tip: () => view?.tip(),
+      at: (end) => view?.at(end),
+      frames: () => view?.frames(),
+    },
+  }).kineme;
+  const view = sceneOrNothing();
+
+  /** Show a movement, or an arm at rest. */
+  function load(next) {
+    data = next;
+    times = data.times;
+    duration = times[times.length - 1];
+    charts = [...document.querySelectorAll(".chart")].map((chart) => ({
+      cursor: chart.querySelector(".cursor"),
+      output: chart.querySelector("output"),
+      width: chart.querySelector("svg").viewBox.baseVal.width,
+    }));
+    byId("legend-wanted").hidden = !data.wanted.length;
+    setPlaying(false);
+    view?.load();
+    show(0);
+  }
+
+  /** Bend the joints, whatever the movement says. @param {number[]} joints */
+  function pose(joints) {
+    view?.show(joints, 0);
+  }
 
   /** The last sample at or before a time, and how far the time lies between it and the next one. */
   function sampleAt(at) {
@@ -41,11 +71,11 @@
     const joints = between(data.positions, sample);
     const values = [...joints, ...data.steps.map((channel) => channel[sample[0]])];
     const said = `${time.toFixed(2)} s`;
-    slider.value = String((Number(slider.max) * time) / duration);
+    slider.value = String((Number(slider.max) * time) / (duration || 1));
     slider.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${duration.toFixed(2)} seconds`);
     now.textContent = said + (time < data.begins ? " approach" : "");
     charts.forEach((chart, k) => {
-      const x = String((chart.width * time) / duration);
+      const x = String((chart.width * time) / (duration || 1));
       chart.cursor.setAttribute("x1", x);
       chart.cursor.setAttribute("x2", x);
       const unit = chart.output.dataset.unit;
@@ -80,10 +110,7 @@
     event.preventDefault();
     setPlaying(last === null);
   });
-  if (!data.wanted.length) byId("legend-wanted").hidden = true;
-  show(0);
-  // For tests: where the drawn arm has its tip.
-  Object.assign(window, { kineme: { show, tip: () => view?.tip(), frames: () => view?.frames() } });
+  if (byId("data")) load(JSON.parse(byId("data").textContent)); // else it is told what to show
 
   /** The scene, or null where the browser cannot draw one: the charts and the table still work. */
   function sceneOrNothing() {
@@ -107,40 +134,103 @@
     const camera = new T.PerspectiveCamera(40, 1, 0.01, 100);
     camera.up.set(0, 0, 1);
     const dark = window.matchMedia("(prefers-color-scheme: dark)");
-    const arm = readArm(T, () => draw());
-    const [middle, reach] = extent(T, arm);
-    let grid = null;
-    let frames = 0;
+    let [grid, held, frames, reach, first] = [null, null, 0, 1, 1];
+    let middle = new T.Vector3();
+    /** @type {any} What belongs to the movement: the arm, its paths, start and goal. */
+    const shown = { arm: null, urdf: "", parts: [], ends: {} };
 
     world.add(new T.HemisphereLight(0xffffff, 0x8890a0, 2.2));
     const sun = new T.DirectionalLight(0xffffff, 1.8);
     sun.position.set(1, -1.5, 2);
-    world.add(sun, arm);
-    const thin = Math.max(0.0022 * reach, 0.0006);
-    const first = Math.max(sampleAt(data.begins)[0], 1);
-    const { executed, wanted } = data;
-    const light = tube(T, wanted, 3.2 * thin, data.colors.wanted, 1, 0.5);
-    if (wanted.length > 1) world.add(light);
-    world.add(tube(T, executed.slice(0, first + 1), 0.7 * thin, data.colors.approach, 2));
-    world.add(tube(T, executed.slice(first), 0.7 * thin, data.colors.executed, 2));
-    const approach = tube(T, executed.slice(0, first + 1), 1.7 * thin, data.colors.approach, 3);
-    const movement = tube(T, executed.slice(first), 1.7 * thin, data.colors.executed, 3);
-    world.add(approach, movement, mark(T, new T.SphereGeometry(4.5 * thin), data.start, data.colors.executed));
-    const behind = tube(T, executed.slice(first), 0.7 * thin, data.colors.executed, 4, 0.3); // where the arm hides it
-    behind.material.depthTest = false;
-    world.add(behind);
-    world.add(mark(T, new T.OctahedronGeometry(6.5 * thin), data.goal, data.colors.goal));
+    world.add(sun);
 
+    canvas.addEventListener("pointerdown", grab); // before the view is turned
     const controls = new T.OrbitControls(camera, canvas);
     controls.addEventListener("change", draw);
     reset.addEventListener("click", home);
     canvas.addEventListener("keydown", turn);
     dark.addEventListener("change", paint);
     new ResizeObserver(fit).observe(canvas.parentElement);
-    paint();
-    fit();
-    home();
 
+    function load() {
+      const isSame = !data.urdf || shown.urdf === data.urdf;
+      world.remove(...shown.parts);
+      if (!isSame) {
+        if (shown.arm) world.remove(shown.arm);
+        shown.arm = readArm(T, () => draw());
+        world.add(shown.arm);
+      }
+      const size = extent(T, shown.arm);
+      if (!isSame) [middle, reach] = size;
+      const thin = Math.max(0.0022 * reach, 0.0006);
+      first = Math.max(sampleAt(data.begins)[0], 1);
+      const { executed, wanted, colors } = data;
+      const [before, after] = [executed.slice(0, first + 1), executed.slice(first)];
+      const light = tube(T, wanted, 3.2 * thin, colors.wanted, 1, 0.5);
+      const approach = tube(T, before, 1.7 * thin, colors.approach, 3);
+      const movement = tube(T, after, 1.7 * thin, colors.executed, 3);
+      const behind = tube(T, after, 0.7 * thin, colors.executed, 4, 0.3); // where the arm hides it
+      behind.material.depthTest = false;
+      const whole = [tube(T, before, 0.7 * thin, colors.approach, 2), tube(T, after, 0.7 * thin, colors.executed, 2)];
+      const larger = api.moved ? 1.8 : 1; // to be taken hold of
+      const ends = {
+        start: mark(T, new T.SphereGeometry(4.5 * thin * larger), data.start, colors.executed),
+        goal: mark(T, new T.OctahedronGeometry(6.5 * thin * larger), data.goal, colors.goal),
+      };
+      const parts = executed.length > 1 ? [...whole, approach, movement, behind, ends.start, ends.goal] : [];
+      if (wanted.length > 1) parts.push(light);
+      if (parts.length) world.add(...parts);
+      Object.assign(shown, { urdf: data.urdf || shown.urdf, parts, ends, light, approach, movement });
+      paint();
+      if (isSame) return;
+      fit();
+      home();
+    }
+
+    /** Pixels of a place on the canvas. */
+    function onScreen(place) {
+      const { x, y } = place.clone().project(camera);
+      return [((1 + x) * canvas.clientWidth) / 2, ((1 - y) * canvas.clientHeight) / 2];
+    }
+    /** Take hold of the start or the goal, where somebody hears of it. @param {PointerEvent} event */
+    function grab(event) {
+      if (!api.moved || !shown.parts.length || event.button !== 0) return;
+      const box = canvas.getBoundingClientRect();
+      const near = (name) => {
+        const [x, y] = onScreen(shown.ends[name].position);
+        return Math.hypot(x - event.clientX + box.left, y - event.clientY + box.top);
+      };
+      held = near("goal") <= near("start") ? "goal" : "start";
+      if (near(held) > 22) return;
+      controls.enabled = false;
+      canvas.setPointerCapture(event.pointerId);
+      const { position } = shown.ends[held];
+      const begin = position.clone();
+      const depth = begin.clone().project(camera).z;
+      // The goal of a drawing stays in its plane.
+      const height = data.start[2];
+      const isFlat =
+        held === "goal" && data.wanted[0] && data.wanted.every((point) => Math.abs(point[2] - height) < 1e-3);
+      const go = (now) => {
+        const [x, y] = [(2 * (now.clientX - box.left)) / box.width - 1, 1 - (2 * (now.clientY - box.top)) / box.height];
+        const place = new T.Vector3(x, y, depth).unproject(camera);
+        if (isFlat) {
+          const ray = place.clone().sub(camera.position);
+          const share = (height - camera.position.z) / ray.z;
+          if (!(share > 0 && share * ray.length() < 20)) return;
+          place.copy(camera.position).addScaledVector(ray, share);
+        }
+        position.copy(place);
+        draw();
+      };
+      const end = () => {
+        canvas.removeEventListener("pointermove", go);
+        controls.enabled = true;
+        if (position.distanceTo(begin) > 1e-6) api.moved(held, position.toArray());
+      };
+      canvas.addEventListener("pointermove", go);
+      canvas.addEventListener("lostpointercapture", end, { once: true });
+    }
     function home() {
       controls.target.copy(middle);
       const back = camera.aspect < 1 ? 1 / camera.aspect : 1;
@@ -163,7 +253,7 @@
     function paint() {
       const lines = dark.matches ? [0x59616b, 0x343a42] : [0xa9afb8, 0xd3d7dd];
       world.background = new T.Color(dark.matches ? 0x1e2226 : 0xf4f5f7);
-      light.material.opacity = dark.matches ? 0.8 : 0.5;
+      shown.light.material.opacity = dark.matches ? 0.8 : 0.5;
       if (grid) world.remove(grid);
       grid = new T.GridHelper(2.4 * Math.max(reach, 0.2), 24, ...lines);
       grid.rotation.x = Math.PI / 2;
@@ -191,16 +281,18 @@
       renderer.render(world, camera);
     }
     return {
+      load,
       show(joints, sample) {
-        pose(arm, joints);
-        approach.show(sample);
-        movement.show(Math.max(sample - first, 0));
+        bend(shown.arm, joints);
+        shown.approach.show(sample);
+        shown.movement.show(Math.max(sample - first, 0));
         draw();
       },
       tip() {
-        arm.updateMatrixWorld(true);
-        return arm.links[data.tip].getWorldPosition(new T.Vector3()).toArray();
+        shown.arm.updateMatrixWorld(true);
+        return shown.arm.links[data.tip].getWorldPosition(new T.Vector3()).toArray();
       },
+      at: (end) => onScreen(shown.ends[end].position),
       frames: () => frames,
     };
   }
@@ -225,7 +317,7 @@
     return new T.ColladaLoader(manager).parse(new TextDecoder().decode(bytes), "").scene;
   }
 
-  function pose(arm, joints) {
+  function bend(arm, joints) {
     for (const [k, name] of data.joints.entries()) arm.setJointValue(name, joints[k]);
   }
 
@@ -243,7 +335,7 @@
       data.positions[data.positions.length >> 1],
       data.positions[data.positions.length - 1],
     ]) {
-      pose(arm, row);
+      bend(arm, row);
       arm.updateMatrixWorld(true);
       for (const link of Object.values(arm.links)) include(link.getWorldPosition(new T.Vector3()).toArray());
     }

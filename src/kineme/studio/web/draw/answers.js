@@ -1,6 +1,5 @@
 // What the server says of the movement on the canvas: while it is drawn, and once it is over.
 import { byId } from "../parts/elements.js";
-import { library } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
 import { currentView } from "../parts/views.js";
 
@@ -47,43 +46,27 @@ export function showAnswer(session, answer) {
   session.pending = false;
   session.naming.allow(true);
   if (answer !== null) showRecognized(session, answer);
-  else if (library().symbols.length) showTooFew(session);
-  else showNew(session, "The first of its kind", "Give it a name.");
+  else showNew(session);
 }
 
 /** @param {Session} session @param {any} answer */
 function showRecognized(session, answer) {
-  session.panel.final(answer);
+  const { movement } = session;
+  session.panel.final(answer, () => server.explain(movement));
   session.label = answer.label;
   byId("draw-move").disabled = answer.label === null;
-  suggestNames(
-    session,
-    answer.ranked.map((/** @type {any} */ candidate) => candidate.label),
-  );
+  const names = answer.ranked.map((/** @type {any} */ candidate) => candidate.label);
+  session.naming.allow(true, [...new Set([answer.label ?? names[0], ...names])].slice(0, SUGGESTED));
   focusName(session);
 }
 
-/** One movement has a name: too few to say what is unlike it. @param {Session} session */
-function showTooFew(session) {
-  const { symbols } = library();
-  const text = `Only ${symbols[0].name} is known. Draw something else and name it, too: two names can be told apart.`;
-  suggestNames(
-    session,
-    symbols.map((/** @type {any} */ symbol) => symbol.name),
-  );
-  showNew(session, "Too few to compare", text);
-}
-
-/** @param {Session} session @param {string} kind @param {string} text */
-function showNew(session, kind, text) {
-  session.panel.words(kind, "?", text, "unknown");
+/** Nothing is known that it could be like. @param {Session} session */
+function showNew(session) {
+  session.panel.words("New", "?", "Give it a name.", "unknown");
   session.panel.progress(1);
   session.panel.speak("Give it a name.");
   focusName(session);
 }
-
-/** @param {Session} session @param {string[]} names */
-const suggestNames = (session, names) => session.naming.allow(true, names.slice(0, SUGGESTED));
 
 /**
  * Show what the server could not do.

@@ -1,10 +1,14 @@
 // A movement is drawn on the canvas: its samples go to the picture and to the server.
-import { byId } from "../parts/elements.js";
+import { byId, write } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
+import { mirror } from "../parts/mirror.js";
 import { requestAnswer, showAnswer } from "./answers.js";
 import { showLegend, takesDrawings } from "./invitation.js";
 import { canvasHeight } from "./scale.js";
 import { clear, FEWEST_SAMPLES, movementOf } from "./session.js";
+
+const PATIENCE = 1500; // [ms]
+const LATE = "The server takes long. Nothing is lost.";
 
 /** @typedef {import("./session.js").Session} Session */
 
@@ -30,12 +34,15 @@ function begin(session, pointer) {
   Object.assign(session, { drawing: true, pointer, height: canvasHeight() });
   showLegend(true);
   session.panel.words("Drawing", "…", "", "open");
+  const late = () => byId("verdict-kind").textContent === "Drawing" && write(byId("verdict-note"), LATE);
+  if (library().symbols.length) setTimeout(late, PATIENCE);
   return true;
 }
 
 /** @param {Session} session @param {number[][]} samples */
 function extend(session, samples) {
   session.picture.ink.push(...samples);
+  mirror(samples[samples.length - 1]);
   session.picture.board.draw();
   if (library().symbols.length) session.sending.push(inLibrary(samples, session.height));
 }

@@ -1,7 +1,9 @@
 // What the empty canvas says, and whether one may draw on it.
-import { byId } from "../parts/elements.js";
+import { breakable, byId, fill, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
+import { thumbnail } from "../parts/thumbnails.js";
 
+const SHOWN = 12; // symbols whose pictures say what can be drawn
 const SAME_HEIGHT = 1e-9; // of points of a plane movement
 
 /** Whether drawings fit the library: in the plane, or in space where all movements are plane. */
@@ -13,37 +15,27 @@ export function takesDrawings() {
   return dims === 3 && symbols.every((symbol) => !symbol.path || isPlane(symbol.path));
 }
 
-/** @returns {{title: string, text: string}} */
-function invitation() {
-  const { symbols, read_only: readOnly } = library();
-  if (!takesDrawings())
-    return {
-      title: "Movements in space",
-      text:
-        "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or " +
-        "drop a recording in Recordings.",
-    };
-  return {
-    title: symbols.length ? "Draw a movement here" : "Nothing is known yet",
-    text:
-      symbols.length || readOnly
-        ? "In one stroke, with mouse, pen or finger. What it is appears while you draw."
-        : "Draw a movement in one stroke, then give it a name. One drawing is enough to be recognized again.",
-  };
-}
-
 /** @param {boolean} filled Whether there is a movement on the canvas. */
 export function showInvitation(filled) {
-  const { title, text } = invitation();
+  const [{ symbols }, takes] = [library(), takesDrawings()];
   showLegend(filled);
-  byId("draw-empty-title").textContent = title;
-  byId("draw-empty-text").textContent = text;
-  byId("draw-how").hidden = takesDrawings();
-  if (!takesDrawings()) byId("live-source").open = true;
+  byId("draw-empty-title").textContent = takes ? "Draw a movement here" : "Movements in space";
+  byId("draw-empty-text").textContent = takes
+    ? "In one stroke, with mouse, pen or finger."
+    : "A mouse cannot draw them. Send samples from a program and see them here, or drop a recording in Recordings.";
+  if (!takes) byId("live-source").open = true;
+  byId("draw-examples").hidden = byId("first-steps").hidden = symbols.length > 0;
+  byId("known-title").hidden = !symbols.length || !takes;
+  fill(byId("known-symbols"), ...symbols.slice(0, SHOWN).map(picture));
 }
+
+/** @param {any} symbol */
+const picture = ({ name, path }) => make("li", {}, thumbnail(path), make("span", { title: name }, ...breakable(name)));
 
 /** @param {boolean} filled Whether there is a movement: the invitation goes, and what its colors mean is said. */
 export function showLegend(filled) {
+  const { symbols } = library();
   byId("draw-empty").hidden = filled;
-  byId("draw-legend").hidden = !filled || !library().symbols.length;
+  byId("draw-legend").hidden = !filled || !symbols.length;
+  byId("view-draw").dataset.state = filled ? (symbols.length ? "drawn" : "first") : "empty";
 }

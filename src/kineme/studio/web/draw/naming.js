@@ -41,11 +41,11 @@ export function startNaming(page) {
       field.disabled = !open;
       byId("naming-learn").disabled = !open;
       byId("draw-save").disabled = !open;
-      const chip = (/** @type {string} */ name) =>
+      const chip = (/** @type {string} */ name, /** @type {number} */ k) =>
         make(
           "button",
-          { class: "button chip", type: "button", "aria-label": `Learn as ${name}`, on: { click: () => keep(name) } },
-          `+ ${name}`,
+          { class: k ? "button chip" : "button chip main", type: "button", on: { click: () => keep(name) } },
+          k ? `No, ${name}` : `Yes, it is ${name}`,
         );
       fill(byId("chips"), ...(open ? names.map(chip) : []));
     },

@@ -1,7 +1,7 @@
 // The movement that is on the canvas: under way, over, named; and the parts of the view that show it.
 import { AnswerPanel } from "../parts/answer_panel.js";
 import { byId } from "../parts/elements.js";
-import { isLoaded, library } from "../parts/library_state.js";
+import { isLoaded, symbolNamed } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
 import { showInvitation } from "./invitation.js";
 import { Picture } from "./picture.js";
@@ -29,7 +29,7 @@ export const FEWEST_SAMPLES = 4; // that make a movement
 /** @param {(message: Object) => boolean} send @returns {Session} */
 export const createSession = (send) => ({
   picture: new Picture(byId("draw-canvas")),
-  panel: new AnswerPanel({ invitation: () => (library().read_only ? "" : " Give it a name.") }),
+  panel: new AnswerPanel({ picture: (name) => symbolNamed(name)?.path ?? null }),
   sending: server.follow(send),
   naming: null,
   drawing: false,

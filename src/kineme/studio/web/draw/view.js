@@ -1,8 +1,9 @@
 // Draw: a movement is recognized while it is drawn, and learned from one drawing.
+import { learnExample } from "../parts/changes.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { followTurns } from "../parts/dragging.js";
 import { byId } from "../parts/elements.js";
-import { library, onLibrary, symbolNamed } from "../parts/library_state.js";
+import { onLibrary, symbolNamed } from "../parts/library_state.js";
 import { followPointer } from "../parts/stroke.js";
 import { currentView, show } from "../parts/views.js";
 import { hearAnswer, requestAnswer, showError, showState } from "./answers.js";
@@ -24,11 +25,7 @@ function showLearned(session, name) {
   session.naming.empty();
   session.naming.allow(false);
   byId("draw-move").disabled = name === null;
-  const advice =
-    library().symbols.length < 2
-      ? "Now draw something else and name it: two names can be told apart."
-      : "Draw it again, anywhere and in any size.";
-  if (name !== null) session.panel.words("Learned", name, advice, "known");
+  if (name !== null) session.panel.words("Learned", name, "Draw it again, anywhere and in any size.", "known", name);
   byId("sources").classList.remove("waits");
   byId("draw-canvas").focus({ preventScroll: true });
 }
@@ -58,11 +55,12 @@ function listen(session) {
     const isOurs = event.key === "Escape" && currentView() === "draw";
     if (isOurs && !document.querySelector("dialog[open]")) clear(session);
   });
-  byId("draw-how").addEventListener("click", () => {
-    byId("live-source").scrollIntoView({ block: "start" });
-    /** @type {HTMLElement} */ (byId("live-source").firstElementChild).focus();
-  });
   onLibrary(() => showInvitation(picture.ink.length > 0));
+  for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-example]")))
+    button.addEventListener("click", async () => {
+      const { example } = button.dataset;
+      if ((await learnExample(example)) && example === "arm") show("robot", true);
+    });
 }
 
 /** @param {(message: Object) => boolean} send @returns What hears the server. */

@@ -2,7 +2,7 @@
 import { get } from "../parts/api.js";
 import { restore } from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { byId, fill, keepingFocus, make } from "../parts/elements.js";
+import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 
@@ -14,6 +14,11 @@ async function again(entry, seen) {
   if (await ask({ title: `Restore version ${entry.number}?`, text, yes: "Restore" })) await restore(entry.number, seen);
 }
 
+/** @param {any} entry */
+const of = ({ number }) => ({
+  ...{ class: "button quiet", "data-key": `restore ${number}`, "aria-label": `Restore version ${number}` },
+});
+
 /** @param {any} entry @param {number} seen */
 const row = (entry, seen) =>
   make(
@@ -22,19 +27,7 @@ const row = (entry, seen) =>
     make("span", { class: "numbers soft" }, `${entry.number}`),
     make("span", { class: "said" }, entry.said),
     make("time", { class: "soft small" }, String(entry.time).replace("T", " ").slice(0, 19)),
-    entry.can_restore
-      ? make(
-          "button",
-          {
-            class: "button quiet",
-            type: "button",
-            "data-key": `restore ${entry.number}`,
-            "aria-label": `Restore version ${entry.number}`,
-            on: { click: () => again(entry, seen) },
-          },
-          "Restore",
-        )
-      : null,
+    entry.can_restore ? button("Restore", () => again(entry, seen), of(entry)) : null,
   );
 
 export async function showHistory() {

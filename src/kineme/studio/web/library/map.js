@@ -17,13 +17,14 @@ export class MovementMap {
     this.points = [];
     this.at = -1;
     this.board = new Board(byId("map"), () => this.paint());
-    this.board.canvas.addEventListener("pointermove", (event) => this.point(event));
-    this.board.canvas.addEventListener("pointerleave", () => this.show(-1));
-    this.board.canvas.addEventListener("click", (event) => {
+    const canvas = byId("map");
+    canvas.addEventListener("pointermove", (event) => this.point(event));
+    canvas.addEventListener("pointerleave", () => this.show(-1));
+    canvas.addEventListener("click", (event) => {
       this.point(event);
       this.choose();
     });
-    this.board.canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
   async load() {

@@ -1,6 +1,6 @@
 // Movements as pictures that can be chosen, sixty at a time.
 import { get } from "../parts/api.js";
-import { counted, fill, make } from "../parts/elements.js";
+import { button, counted, fill, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 import { tried } from "../parts/toasts.js";
@@ -12,24 +12,17 @@ export function memberButton(movement, chosen, changed) {
   const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
   if (library().read_only)
     return make("div", { class: "member", role: "img", "aria-label": about, title: about }, thumbnail(movement.path));
-  const button = make(
-    "button",
-    {
-      class: "member",
-      type: "button",
-      "aria-pressed": String(chosen.has(movement.id)),
-      "aria-label": about,
-      title: about,
-      "data-key": `movement ${movement.id}`,
-    },
-    thumbnail(movement.path),
-  );
-  button.addEventListener("click", () => {
+  const choose = () => {
     chosen.has(movement.id) ? chosen.delete(movement.id) : chosen.add(movement.id);
-    button.setAttribute("aria-pressed", String(chosen.has(movement.id)));
+    member.setAttribute("aria-pressed", String(chosen.has(movement.id)));
     changed();
+  };
+  const member = button("", choose, {
+    ...{ class: "member", "aria-label": about, title: about, "data-key": `movement ${movement.id}` },
+    "aria-pressed": String(chosen.has(movement.id)),
   });
-  return button;
+  member.append(thumbnail(movement.path));
+  return member;
 }
 
 /** The members of a symbol, or the movements without one, with a button for more. */
@@ -39,16 +32,9 @@ export class Members {
     this.query = query;
     this.changed = changed;
     this.chosen = new Set();
-    this.grid = make("div", {
-      class: "members",
-      role: "group",
-      "aria-label": library().read_only ? "Movements" : "Movements; choose some",
-    });
-    this.more = make(
-      "button",
-      { class: "button quiet", type: "button", hidden: true, on: { click: () => this.load() } },
-      "Show more",
-    );
+    const label = library().read_only ? "Movements" : "Movements; choose some";
+    this.grid = make("div", { class: "members", role: "group", "aria-label": label });
+    this.more = button("Show more", () => this.load(), { class: "button quiet", hidden: true });
     this.element = make("div", { class: "members-part" }, this.grid, this.more);
     this.shown = 0;
     this.loading = false;
@@ -64,9 +50,7 @@ export class Members {
     this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);
-    this.grid.append(
-      ...answer.movements.map((/** @type {any} */ movement) => memberButton(movement, this.chosen, this.changed)),
-    );
+    for (const movement of answer.movements) this.grid.append(memberButton(movement, this.chosen, this.changed));
     this.shown += answer.movements.length;
     this.more.hidden = this.shown >= answer.total;
     this.more.textContent = `Show more of ${counted(answer.total, "movement")}`;

@@ -1,7 +1,7 @@
 // Proposals: groups of movements without a name. All or some of them get one, or they are not a symbol.
 import { get } from "../parts/api.js";
 import { accept, assign, reject } from "../parts/changes.js";
-import { byId, counted, fill, keepingFocus, make } from "../parts/elements.js";
+import { button, byId, counted, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { memberButton } from "./members.js";
@@ -24,38 +24,22 @@ async function unlabeled() {
 function card(proposal, movements) {
   const chosen = new Set();
   const field = make("input", {
-    type: "text",
-    list: "names",
-    maxlength: "200",
-    placeholder: "Name",
-    "aria-label": "Name of these movements",
-    "data-key": `proposal ${proposal.medoid}`,
-    value: proposal.name ?? "",
+    ...{ type: "text", list: "names", maxlength: "200", placeholder: "Name", value: proposal.name ?? "" },
+    ...{ "aria-label": "Name of these movements", "data-key": `proposal ${proposal.medoid}` },
   });
   const yes = make("button", { class: "button main", type: "submit" });
   const label = () =>
     (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
   label();
-  const shown = [
-    proposal.medoid,
-    ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid),
-  ].slice(0, SHOWN);
+  const shown = [...new Set([proposal.medoid, ...proposal.members])].slice(0, SHOWN);
+  const about = library().read_only ? "Its movements" : "Its movements; choose some to name those alone";
   const grid = make(
     "div",
-    {
-      class: "members",
-      role: "group",
-      "aria-label": library().read_only ? "Its movements" : "Its movements; choose some to name those alone",
-    },
+    { class: "members", role: "group", "aria-label": about },
     ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)),
   );
-  const form = make(
-    "form",
-    { class: "naming" },
-    field,
-    yes,
-    make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "Not a symbol"),
-  );
+  const no = button("Not a symbol", () => reject(proposal.id), { class: "button quiet" });
+  const form = make("form", { class: "naming" }, field, yes, no);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const name = field.value.trim();

@@ -1,7 +1,7 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { breakable, byId, counted, fill, make } from "../parts/elements.js";
+import { breakable, button, byId, counted, fill, make } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 import { show } from "../parts/views.js";
@@ -11,8 +11,7 @@ import { Members } from "./members.js";
 const UNLABELED = "";
 
 /** @param {string} text @param {() => any} act @param {string} kind */
-const button = (text, act, kind = "") =>
-  make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, on: { click: act } }, text);
+const action = (text, act, kind = "") => button(text, act, { class: `button ${kind}`, "data-key": `symbol ${text}` });
 
 /** @param {any} symbol */
 async function rename(symbol) {
@@ -43,47 +42,27 @@ function description(symbol) {
  */
 function actions(symbol, members) {
   const ids = () => members.ids();
-  const name = (/** @type {string} */ title) =>
-    ask({
-      title,
-      text:
-        `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, ` +
-        "another one is a new symbol.",
-      yes: "Give the name",
-      name: "",
-    });
+  const some = () => counted(ids().length, "movement");
+  /** @type {(title: string, text: string, yes: string) => Promise<string|null>} */
+  const named = (title, text, yes) => ask({ title, text: `${some()} ${text}`, yes, name: "" });
   const give = async () => {
-    const to = await name("Which name?");
+    const text = "chosen. A name that exists is that symbol, another one is a new symbol.";
+    const to = await named("Which name?", text, "Give the name");
     if (to) await changes.assign(ids(), to);
   };
   const split = async () => {
-    const to = await ask({
-      title: `Split ${symbol.name}`,
-      text: `${counted(ids().length, "movement")} become a symbol of their own.`,
-      yes: "Split",
-      name: "",
-    });
+    const to = await named(`Split ${symbol.name}`, "become a symbol of their own.", "Split");
     if (to) await changes.split(symbol.id, ids(), to);
   };
   const drop = async () => {
-    if (
-      await ask({
-        title: `Delete ${counted(ids().length, "movement")}?`,
-        text: "This can be undone.",
-        yes: "Delete",
-        danger: true,
-      })
-    )
-      await changes.deleteMovements(ids());
+    const question = { title: `Delete ${some()}?`, text: "This can be undone.", yes: "Delete", danger: true };
+    if (await ask(question)) await changes.deleteMovements(ids());
   };
+  const unname = () => changes.assign(ids(), null);
   const buttons = symbol
-    ? [
-        button("Split off", split),
-        button("Give another name", give),
-        button("Remove the name", () => changes.assign(ids(), null)),
-      ]
-    : [button("Give a name", give, "main")];
-  return [...buttons, button("Delete", drop, "danger")];
+    ? [action("Split off", split), action("Give another name", give), action("Remove the name", unname)]
+    : [action("Give a name", give, "main")];
+  return [...buttons, action("Delete", drop, "danger")];
 }
 
 /**
@@ -94,10 +73,7 @@ export class SymbolPanel {
   /** @param {(id: string) => void} closed */
   constructor(closed) {
     this.closed = closed;
-    byId("symbol").addEventListener(
-      "keydown",
-      (/** @type {KeyboardEvent} */ event) => event.key === "Escape" && this.close(),
-    );
+    byId("symbol").addEventListener("keydown", ({ key }) => key === "Escape" && this.close());
     /** @type {string|null} Id; "" for the movements without a symbol. */
     this.opened = null;
     this.version = -1;
@@ -121,12 +97,7 @@ export class SymbolPanel {
   show() {
     const panel = byId("symbol");
     const symbol = this.opened ? symbolOf(this.opened) : null;
-    if (
-      this.opened === null ||
-      (this.opened !== UNLABELED && !symbol) ||
-      (this.opened === UNLABELED && !library().unlabeled)
-    )
-      return this.hint(panel);
+    if (!symbol && (this.opened !== UNLABELED || !library().unlabeled)) return this.hint(panel);
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
@@ -139,23 +110,13 @@ export class SymbolPanel {
     const acts = library().read_only ? [] : actions(symbol, members);
     for (const act of acts) act.disabled = true;
     const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" }, ...acts);
-    const close = make(
-      "button",
-      {
-        class: "button quiet square sheet-close",
-        type: "button",
-        "aria-label": "Close",
-        on: { click: () => this.close() },
-      },
-      "×",
-    );
-    const acting = acts.length ? [count, bar] : [];
+    const close = { class: "button quiet square sheet-close", "aria-label": "Close" };
     fill(
       panel,
-      close,
+      button("×", () => this.close(), close),
       ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]),
       make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")),
-      ...acting,
+      ...(acts.length ? [count, bar] : []),
       members.element,
     );
   }
@@ -168,21 +129,15 @@ export class SymbolPanel {
     };
     const { read_only: readOnly } = library();
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
+    const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts));
+    const acts = [
+      action("Move it", moveIt, "main"),
+      action("Rename", () => rename(symbol)),
+      action("Delete symbol", () => forget(symbol), "danger"),
+    ];
     return [
-      make(
-        "div",
-        { class: "symbol-head" },
-        thumbnail(symbol.path),
-        make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts)),
-      ),
-      make(
-        "div",
-        { class: "row" },
-        button("Move it", moveIt, "main"),
-        ...(readOnly
-          ? []
-          : [button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")]),
-      ),
+      make("div", { class: "symbol-head" }, thumbnail(symbol.path), words),
+      make("div", { class: "row" }, ...acts.slice(0, readOnly ? 1 : 3)),
       readOnly ? symbol.description && make("p", {}, symbol.description) : description(symbol),
     ];
   }
@@ -191,21 +146,10 @@ export class SymbolPanel {
   hint(panel) {
     this.opened = null;
     panel.classList.remove("opened");
-    fill(
-      panel,
-      make(
-        "div",
-        { class: "empty" },
-        make("h3", {}, "Choose a symbol"),
-        make(
-          "p",
-          {},
-          library().read_only
-            ? "Here its movements are shown."
-            : "Here it can be renamed, described and deleted; its movements can be split off or given to another " +
-                "symbol. Everything can be undone.",
-        ),
-      ),
-    );
+    const text = library().read_only
+      ? "Here its movements are shown."
+      : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. " +
+        "Everything can be undone.";
+    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, text)));
   }
 }

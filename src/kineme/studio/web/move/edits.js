@@ -11,14 +11,25 @@ import { movingFormulations } from "./session.js";
 
 const VIA_TIMES = [0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875]; // of new via points, shares of the duration
 const OBSTACLE = { time: 0.6, away: 0.08, radius: 0.07 }; // beside the path, in sizes of the movement
+const SAME = 0.04; // of the duration: a place of the path so near to a via point takes hold of that one
 const LONGEST = 4; // times the demonstrated duration; the shortest is as many times less
 
 /** @typedef {import("./session.js").Session} Session */
 
+/** @typedef {{changed: () => void, removed: (list: Object[], point: Object) => void}} Page */
+
+/** What hears of points that changed, or went away. @param {Session} session @returns {Page} */
+const pageOf = (session) => ({
+  changed: () => showChange(session),
+  removed: (list, point) => {
+    list.splice(list.indexOf(point), 1);
+    showStructure(session);
+  },
+});
+
 /** Points came or went. @param {Session} session */
 export function showStructure(session) {
-  const page = { changed: () => showChange(session), removed: () => showStructure(session) };
-  session.handles.set(handlesOf(session.plan, session.camera, page));
+  session.handles.set(handlesOf(session.plan, session.camera, pageOf(session)));
   showChange(session);
 }
 
@@ -36,12 +47,12 @@ export function showChange(session) {
 
 /** @param {Session} session */
 function showNumbers(session) {
-  session.steps.keep(session.plan);
-  showPoints(
-    session.plan,
-    () => showChange(session),
-    () => showStructure(session),
-  );
+  const { steps } = session;
+  steps.keep(session.plan);
+  byId("move-undo").disabled = !steps.has(-1);
+  byId("move-redo").disabled = !steps.has(1);
+  byId("move-reset").disabled = steps.plans.length < 2 && !session.plan.style;
+  showPoints(session.plan, pageOf(session));
 }
 
 /** A point is held, or let go. @param {Session} session @param {boolean} dragging */
@@ -60,13 +71,17 @@ export function stretch(session) {
   showChange(session);
 }
 
-/** Go back before the last change of a point or the duration. @param {Session} session */
-export function undoEdit(session) {
+/**
+ * Go back before the last change of a point or the duration, or forth again.
+ * @param {Session} session @param {number} by -1 goes back, 1 forth.
+ */
+export function step(session, by) {
   const { plan, steps } = session;
-  if (!plan || !steps.back(plan)) {
-    say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
+  if (!plan || !steps.has(by)) {
+    if (by < 0) say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
     return;
   }
+  steps.go(plan, by);
   byId("duration").value = String(Math.round((100 * Math.log(plan.share)) / Math.log(LONGEST)));
   showStructure(session);
 }
@@ -78,6 +93,21 @@ export function undoEdit(session) {
 function pointAt({ picture, plan }, time) {
   const points = picture.paths[0]?.path.positions ?? plan.path;
   return [...points[Math.round(time * (points.length - 1))]];
+}
+
+/**
+ * The path itself is taken hold of: where it is grabbed becomes a via point.
+ * @param {Session} session @param {import("./plan.js").ViaPoint} place @param {PointerEvent} event
+ */
+export function grabPath(session, place, event) {
+  const { plan, handles } = session;
+  let k = plan.via.findIndex(({ at }) => Math.abs(at - place.at) < SAME);
+  if (k < 0) {
+    k = plan.via.push(place) - 1;
+    session.dragging = true; // one step, with what follows
+    showStructure(session);
+  }
+  handles.grab(handles.grips.get(`via ${k}`), event);
 }
 
 /** @param {Session} session */

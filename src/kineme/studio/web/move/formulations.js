@@ -1,38 +1,31 @@
-// Formulations and how each is drawn: by its color and by its dashes.
-import { byId, make } from "../parts/elements.js";
+// Formulations and how each is drawn: by its color and by its dashes. Two have plain words, all are under Advanced.
+import { byId } from "../parts/elements.js";
 
 export const FORMULATIONS = [
-  {
-    name: "bio-inspired",
-    says: "keeps the shape, bent towards the goal",
-    key: "first",
-    look: { color: "--ink", dash: [] },
-  },
-  {
-    name: "amplitude-scaled",
-    says: "scales the whole movement",
-    key: "second",
-    look: { color: "--predicted", dash: [9, 6] },
-  },
-  { name: "original", says: "stretches each axis by its own", key: "third", look: { color: "--goal", dash: [2, 6] } },
+  { name: "bio-inspired", key: "first", look: { color: "--ink", dash: [] } },
+  { name: "amplitude-scaled", key: "second", look: { color: "--predicted", dash: [9, 6] } },
+  { name: "original", key: "third", look: { color: "--goal", dash: [2, 6] } },
 ];
 
-/** @param {(name: string, on: boolean) => void} changed */
-export function showFormulations(changed) {
-  for (const formulation of FORMULATIONS) {
-    const box = make("input", {
-      type: "checkbox",
-      checked: formulation === FORMULATIONS[0],
-      on: { change: () => changed(formulation.name, box.checked) },
-    });
-    byId("formulations").append(
-      make(
-        "label",
-        { class: "check" },
-        box,
-        make("span", { class: `key ${formulation.key}` }),
-        make("span", {}, formulation.name, make("span", { class: "soft small says" }, formulation.says)),
-      ),
-    );
-  }
+/** @param {(names: string[]) => void} changed */
+export function startFormulations(changed) {
+  const boxes = [...byId("formulations").querySelectorAll("input")];
+  const manners = [...byId("manner").querySelectorAll("input")];
+  const show = () => {
+    const names = boxes.filter((box) => box.checked).map((box) => box.value);
+    for (const manner of manners) manner.checked = names.join() === manner.value;
+    changed(names);
+  };
+  byId("formulations").addEventListener("change", show);
+  byId("manner").addEventListener("change", () => {
+    const { value } = manners.find((manner) => manner.checked);
+    for (const box of boxes) box.checked = box.value === value;
+    show();
+  });
+}
+
+/** A style moves in its own formulation alone. @param {boolean} on */
+export function allowFormulations(on) {
+  byId("formulations").disabled = !on;
+  byId("manner").disabled = !on;
 }

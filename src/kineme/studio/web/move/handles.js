@@ -1,21 +1,15 @@
 // The points one can take hold of: buttons over the picture, for the hand and for arrow keys.
 import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
-import { extent } from "./plan.js";
+import { distance, extent, pointsOf } from "./plan.js";
 
 const STEP = 6; // of an arrow key [px]; ten times with Shift
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const SMALLEST = 0.01; // radius of an obstacle, in sizes of the movement
 
 /**
- * @typedef {Object} Handle
- * @property {string} key
- * @property {string} kind
- * @property {string} name
- * @property {() => number[]} at
- * @property {(point: number[]) => void} move
- * @property {() => void} [remove]
- *
+ * @typedef {{key: string, kind: string, name: string, remove?: () => void}} Named
+ * @typedef {Named & {at: () => number[], move: (point: number[]) => void}} Handle
  * @typedef {{handle: Handle, button: HTMLButtonElement}} Grip
  */
 
@@ -23,56 +17,34 @@ const SMALLEST = 0.01; // radius of an obstacle, in sizes of the movement
  * The handles of a plan.
  * @param {import("./plan.js").Plan} plan
  * @param {import("../parts/camera.js").Camera} camera
- * @param {{changed: () => void, removed: () => void}} page
+ * @param {import("./edits.js").Page} page
  * @returns {Handle[]}
  */
 export function handlesOf(plan, camera, page) {
   const smallest = SMALLEST * extent(plan.path);
-  /** @type {(owner: any, field: string) => Pick<Handle, "at"|"move">} */
-  const point = (owner, field) => ({
-    at: () => owner[field],
-    move: (to) => {
-      owner[field] = to;
-      page.changed();
-    },
+  return pointsOf(plan).flatMap(({ key, kind, name, owner, field, list }) => {
+    const remove = list && (() => page.removed(list, owner));
+    /** @type {Handle} */
+    const point = {
+      ...{ key, kind, name, remove },
+      at: () => owner[field],
+      move: (to) => {
+        owner[field] = to;
+        page.changed();
+      },
+    };
+    if (kind !== "obstacle") return [point];
+    /** @type {Handle} */
+    const rim = {
+      ...{ key: `${key} rim`, kind: "rim", name: `Rim of ${name.toLowerCase()}`, remove },
+      at: () => camera.moved(owner.center, owner.radius * camera.scale, 0),
+      move: (to) => {
+        owner.radius = Math.max(distance(to, owner.center), smallest);
+        page.changed();
+      },
+    };
+    return [point, rim];
   });
-  /** @type {(obstacle: import("./plan.js").Obstacle) => Pick<Handle, "at"|"move">} */
-  const rim = (obstacle) => ({
-    at: () => camera.moved(obstacle.center, obstacle.radius * camera.scale, 0),
-    move: (to) => {
-      obstacle.radius = Math.max(Math.hypot(...to.map((value, k) => value - obstacle.center[k])), smallest);
-      page.changed();
-    },
-  });
-  const remove = (/** @type {Object[]} */ points, /** @type {number} */ k) => () => {
-    points.splice(k, 1);
-    page.removed();
-  };
-  return [
-    { key: "start", kind: "start", name: "Start", ...point(plan, "start") },
-    { key: "goal", kind: "goal", name: "Goal", ...point(plan, "goal") },
-    ...plan.via.map((via, k) => ({
-      key: `via ${k}`,
-      kind: "via",
-      name: `Via point ${k + 1}`,
-      remove: remove(plan.via, k),
-      ...point(via, "point"),
-    })),
-    ...plan.obstacles.map((obstacle, k) => ({
-      key: `obstacle ${k}`,
-      kind: "obstacle",
-      name: `Obstacle ${k + 1}`,
-      remove: remove(plan.obstacles, k),
-      ...point(obstacle, "center"),
-    })),
-    ...plan.obstacles.map((obstacle, k) => ({
-      key: `rim ${k}`,
-      kind: "rim",
-      name: `Rim of obstacle ${k + 1}`,
-      remove: remove(plan.obstacles, k),
-      ...rim(obstacle),
-    })),
-  ];
 }
 
 export class Handles {
@@ -114,6 +86,7 @@ export class Handles {
     const grip = { handle, button };
     button.addEventListener("pointerdown", (event) => this.grab(grip, event));
     button.addEventListener("keydown", (event) => this.key(grip, event));
+    button.addEventListener("dblclick", () => grip.handle.remove?.());
     byId("handles").append(button);
     return grip;
   }
@@ -161,7 +134,7 @@ export class Handles {
       button.style.setProperty("--y", `${y.toFixed(1)}px`);
       const text = point.map((value) => this.page.text(value)).join(", ");
       button.setAttribute("aria-label", `${handle.name} at ${text}`);
-      button.title = handle.name;
+      button.title = handle.remove ? `${handle.name}; a double click removes it` : handle.name;
     }
   }
 }

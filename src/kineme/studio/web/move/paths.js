@@ -1,5 +1,5 @@
 // The paths of the formulations: in the picture, in the plots, in the legend; and a dot that runs along each.
-import { byId, fill, make } from "../parts/elements.js";
+import { byId, fill, make, write } from "../parts/elements.js";
 import { lengths } from "../parts/plots.js";
 import { FORMULATIONS } from "./formulations.js";
 import { movingFormulations } from "./session.js";
@@ -37,7 +37,7 @@ export function showPaths(session) {
 function showWarnings(rollouts) {
   const warnings = rollouts.flatMap(({ problem, path }) => [problem, ...(path?.warnings ?? [])]).filter(Boolean);
   const text = [...new Set(warnings)].join(" ");
-  if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
+  write(byId("move-warnings"), text);
 }
 
 /**
@@ -52,7 +52,9 @@ function showLegend(session) {
   fill(
     byId("move-legend"),
     make("li", {}, make("span", { class: "key recorded" }), "recorded"),
-    ...paths.map(({ name, key }) => make("li", {}, make("span", { class: `key ${key}` }), name)),
+    ...paths.map(({ name, key }) =>
+      make("li", {}, make("span", { class: `key ${key}` }), paths.length > 1 ? name : "now"),
+    ),
   );
 }
 

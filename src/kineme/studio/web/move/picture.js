@@ -3,26 +3,43 @@ import { Board, color } from "../parts/canvas.js";
 import { ground, line, mark } from "../parts/lines.js";
 import { byId } from "../parts/elements.js";
 import { followTurns } from "../parts/dragging.js";
-import { extent } from "./plan.js";
+import { extent, isTouched } from "./plan.js";
 
 const LEGEND_ROOM = 40; // at the lower edge [px]
+const NEAR = { mouse: 12, pen: 16, touch: 24 }; // from the path, where it can be taken hold of [px]
+const ENDS = 0.03; // of the duration: nearer to start and goal the path is theirs
 
 export class MovePicture {
-  /** @param {import("../parts/camera.js").Camera} camera @param {() => void} turned */
-  constructor(camera, turned) {
+  /**
+   * @param {import("../parts/camera.js").Camera} camera
+   * @param {() => void} turned
+   * @param {(place: import("./plan.js").ViaPoint, event: PointerEvent) => void} grabbed
+   */
+  constructor(camera, turned, grabbed) {
     this.camera = camera;
     this.paths = [];
     this.plan = null;
     this.time = null;
+    /** @type {import("./plan.js").ViaPoint|null} The place of the path under the pointer. */
+    this.under = null;
     this.board = new Board(byId("move-canvas"), () => this.paint());
     this.board.resized = () => {
       this.fit();
       turned();
     };
     this.turned = turned;
+    const { canvas } = this.board;
+    canvas.addEventListener("pointermove", (event) => event.buttons || this.point(event));
+    canvas.addEventListener("pointerleave", () => this.point(null));
+    canvas.addEventListener("pointerdown", (event) => {
+      this.point(event);
+      if (this.under && event.button === 0) grabbed(this.under, event);
+    });
+    // The page does not scroll with a finger that holds the path.
+    canvas.addEventListener("touchstart", (event) => this.under && event.preventDefault(), { passive: false });
     followTurns(
-      this.board.canvas,
-      () => !this.camera.flat,
+      canvas,
+      () => !this.camera.flat && !this.under,
       (dx, dy) => this.turn(dx, dy),
     );
   }
@@ -40,6 +57,24 @@ export class MovePicture {
     const far = 1.5 * extent(around);
     const near = (/** @type {number[]} */ point) => Math.hypot(...point.map((value, k) => value - path[0][k])) < far;
     return [...around, ...this.paths.flatMap(({ path: drawn }) => drawn.positions.filter(near))];
+  }
+
+  /** Find the place of the path under the pointer. @param {PointerEvent|null} event */
+  point(event) {
+    const before = this.under;
+    this.under = null;
+    const drawn = this.paths[0]?.path.positions;
+    if (event && drawn) {
+      const away = drawn.map((/** @type {number[]} */ point) => {
+        const [x, y] = this.camera.toScreen(point);
+        return Math.hypot(x - event.offsetX, y - event.offsetY);
+      });
+      const k = away.indexOf(Math.min(...away));
+      const at = k / (drawn.length - 1);
+      if (away[k] < NEAR[event.pointerType] && at > ENDS && at < 1 - ENDS) this.under = { at, point: [...drawn[k]] };
+    }
+    this.board.canvas.classList.toggle("grabs", this.under !== null);
+    if (before?.at !== this.under?.at) this.board.draw();
   }
 
   /** The recorded path alone, until it is known how it moves. @param {number[][]} path */
@@ -71,23 +106,29 @@ export class MovePicture {
     if (!this.plan) return;
     const pixels = (/** @type {number[][]} */ rows) => rows.map((row) => this.camera.toScreen(row));
     if (!this.camera.flat) this.ground();
-    for (const { center, radius } of this.plan.obstacles)
-      this.obstacle(this.camera.toScreen(center), radius * this.camera.scale);
+    for (const obstacle of this.plan.obstacles)
+      this.obstacle(
+        this.camera.toScreen(obstacle.center),
+        obstacle.radius * this.camera.scale,
+        this.paths.some(({ path }) => isTouched(obstacle, path.positions)),
+      );
     line(context, pixels(this.plan.path), { color: color("--gray"), width: 7, alpha: 0.28 });
     for (const { path, look } of this.paths)
       line(context, pixels(path.positions), { color: color(look.color), width: 3.5, dash: look.dash });
+    if (this.under) mark(context, this.camera.toScreen(this.under.point), "ring", 8, color("--predicted"));
     if (this.time !== null)
       for (const { path, look } of this.paths)
         mark(context, this.camera.toScreen(this.at(path)), "dot", 9, color(look.color));
   }
 
-  /** @param {number[]} at @param {number} radius [px] */
-  obstacle(at, radius) {
+  /** @param {number[]} at @param {number} radius [px] @param {boolean} touched */
+  obstacle(at, radius, touched) {
     const { context } = this.board;
-    context.globalAlpha = 0.22;
-    mark(context, at, "dot", radius, color("--purple"));
+    const paint = color(touched ? "--failed" : "--purple");
+    context.globalAlpha = touched ? 0.4 : 0.22;
+    mark(context, at, "dot", radius, paint);
     context.globalAlpha = 1;
-    mark(context, at, "ring", radius, color("--purple"));
+    mark(context, at, "ring", radius, paint);
   }
 
   /** A grid below a movement in space, so that one sees how it lies. */
@@ -98,16 +139,13 @@ export class MovePicture {
     ground(this.board.context, this.camera, low, high, color("--line"));
   }
 
-  /** Where a path is now. @param {any} path */
-  at(path) {
-    const next = path.times.findIndex((/** @type {number} */ t) => t - path.times[0] >= this.time);
-    if (next < 0) return path.positions[path.positions.length - 1];
-    if (next === 0) return path.positions[0];
-    const [before, after] = [path.times[next - 1] - path.times[0], path.times[next] - path.times[0]];
-    const share = (this.time - before) / (after - before);
-    return path.positions[next].map(
-      (/** @type {number} */ value, /** @type {number} */ k) =>
-        path.positions[next - 1][k] + share * (value - path.positions[next - 1][k]),
+  /** Where a path is now; its samples are even in time. @param {any} path */
+  at({ times, positions }) {
+    const last = times.length - 1;
+    const at = Math.min((last * this.time) / (times[last] - times[0]), last);
+    const k = Math.min(Math.floor(at), last - 1);
+    return positions[k].map(
+      (/** @type {number} */ value, /** @type {number} */ axis) => value + (at - k) * (positions[k + 1][axis] - value),
     );
   }
 

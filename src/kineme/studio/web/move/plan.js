@@ -18,6 +18,24 @@
  * @property {Obstacle[]} obstacles
  */
 
+/**
+ * The points of a plan, each a field of its owner; `list` is what it can be removed from.
+ * @param {Plan} plan
+ * @returns {{key: string, kind: string, name: string, owner: any, field: string, list?: Object[]}[]}
+ */
+export const pointsOf = (plan) => [
+  { key: "start", kind: "start", name: "Start", owner: plan, field: "start" },
+  { key: "goal", kind: "goal", name: "Goal", owner: plan, field: "goal" },
+  ...plan.via.map((owner, k) => ({
+    ...{ key: `via ${k}`, kind: "via", name: `Point ${k + 1}` },
+    ...{ owner, field: "point", list: plan.via },
+  })),
+  ...plan.obstacles.map((owner, k) => ({
+    ...{ key: `obstacle ${k}`, kind: "obstacle", name: `Obstacle ${k + 1}` },
+    ...{ owner, field: "center", list: plan.obstacles },
+  })),
+];
+
 /** From start to goal. @param {{start: number[], goal: number[]}} plan */
 const way = ({ start, goal }) => goal.map((value, k) => value - start[k]);
 
@@ -52,6 +70,12 @@ export function extent(path) {
   );
   return Math.hypot(...spans) || 1;
 }
+
+/** @param {number[]} a @param {number[]} b */
+export const distance = (a, b) => Math.hypot(...a.map((value, k) => value - b[k]));
+
+/** Whether a path runs through an obstacle. @param {Obstacle} obstacle @param {number[][]} path */
+export const isTouched = ({ center, radius }, path) => path.some((point) => distance(center, point) < 0.999 * radius);
 
 /**
  * A coordinate as far as it matters in a movement of a size.

@@ -1,14 +1,14 @@
 // What Move asks the server for: the movement of a symbol, its primitives, a file of it.
-import { download } from "../parts/api.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { byId } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
-import { say, tried } from "../parts/toasts.js";
+import { save, tried } from "../parts/toasts.js";
 import { showChange, showStructure } from "./edits.js";
-import { FORMULATIONS } from "./formulations.js";
+import { allowFormulations, FORMULATIONS } from "./formulations.js";
 import { showPaths } from "./paths.js";
 import { asShown, question } from "./plan.js";
+import { unit } from "./points.js";
 import { movingFormulations } from "./session.js";
 import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
@@ -29,6 +29,9 @@ export async function chooseSymbol(session, id) {
   session.camera.face([symbol.path]);
   picture.sketch(symbol.path);
   byId("move-name").textContent = symbol.name;
+  document.querySelectorAll(".per").forEach((per, k) => {
+    per.textContent = unit() && ` [${unit()}/s${k ? "²" : ""}]`;
+  });
   const rollout = await tried(() =>
     server.generate({ what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
   );
@@ -41,7 +44,8 @@ export async function chooseSymbol(session, id) {
   session.plan = picture.plan = plan;
   for (const each of rollouts.values()) each.reset();
   byId("duration").value = "0";
-  byId("formulations").disabled = false;
+  allowFormulations(true);
+  byId("move-reset").disabled = true;
   picture.paths = [];
   picture.fit();
   showStructure(session);
@@ -67,31 +71,30 @@ async function prepare(session) {
  */
 function chooseStyle(session, values, formulation) {
   Object.assign(session.plan, { style: values, styled: formulation });
-  byId("formulations").disabled = values !== null;
+  allowFormulations(values === null);
   for (const rollouts of session.rollouts.values()) rollouts.primitive = null;
   showChange(session);
   clearTimeout(session.resting);
   session.resting = setTimeout(() => prepare(session), RESTS);
 }
 
-/** @param {Session} session @param {string} name @param {boolean} ticked */
-export async function tickFormulation(session, name, ticked) {
-  if (ticked) session.ticked.add(name);
-  else session.ticked.delete(name);
+/** @param {Session} session @param {string[]} names Of the formulations that move. */
+export async function tickFormulations(session, names) {
+  const added = names.filter((name) => !session.ticked.has(name));
+  session.ticked = new Set(names);
   if (!session.plan) return;
   showPaths(session);
-  if (!ticked) return;
-  const rollouts = session.rollouts.get(name);
-  await rollouts.prepare(session.plan);
-  if (session.plan && movingFormulations(session).includes(name)) rollouts.follow(session.plan);
+  for (const name of added) {
+    const rollouts = session.rollouts.get(name);
+    await rollouts.prepare(session.plan);
+    if (session.plan && movingFormulations(session).includes(name)) rollouts.follow(session.plan);
+  }
 }
 
 /** Save the movement as a file. @param {Session} session */
-export async function save(session) {
+export function saveMovement(session) {
   if (!session.plan) return;
   const format = byId("export-format").value;
-  const formulation = movingFormulations(session)[0] ?? FORMULATIONS[0].name;
-  const body = { ...question(session.plan, formulation), format };
-  const name = await tried(() => download("/api/export", body, `movement.${format}`));
-  if (name) say(`Saved as ${name}.`);
+  const body = question(session.plan, movingFormulations(session)[0] ?? FORMULATIONS[0].name);
+  save("/api/export", { ...body, format }, `movement.${format}`);
 }

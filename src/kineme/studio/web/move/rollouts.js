@@ -1,11 +1,56 @@
 // The newest path of each formulation: at once by the runtime, with what is to be said of it from the server; never an
 // old one after a new one.
+import { post } from "../parts/api.js";
 import { library } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
+import { openPrimitive } from "../runtime/primitive.js";
 import { question, what } from "./plan.js";
-import { moved, primitiveOf } from "./primitives.js";
 
 const SETTLED = 120; // how long nothing must change before the server is asked for what the page already drew [ms]
+
+const SAMPLES = 201; // as many as the server answers with
+
+/** @type {Map<string, Promise<any>>} */
+const primitives = new Map();
+
+/** @param {any} what @param {string} formulation @returns {Promise<any>} */
+async function ask(what, formulation) {
+  const document = await post("/api/primitive", { what, formulation });
+  return document && openPrimitive(document);
+}
+
+/**
+ * @param {any} what
+ * @param {string} formulation
+ * @param {number} version Of the library.
+ * @returns {Promise<any>} Null where only the server knows.
+ */
+export function primitiveOf(what, formulation, version) {
+  const key = JSON.stringify([what, formulation, version]);
+  if (!primitives.has(key)) {
+    if (primitives.size > 60) primitives.clear();
+    const failed = () => {
+      primitives.delete(key); // next time it is asked again
+      return null;
+    };
+    primitives.set(key, ask(what, formulation).catch(failed));
+  }
+  return /** @type {Promise<any>} */ (primitives.get(key));
+}
+
+/**
+ * What the server would answer to the same question, but for its warnings.
+ * @param {any} primitive @param {any} question @returns {any} Null where there is none, or the server has to say why.
+ */
+function moved(primitive, { start, goal, duration, via, obstacles }) {
+  if (!primitive || obstacles) return null;
+  try {
+    const { times, ...path } = primitive.rollout({ start, goal, duration, via, samples: SAMPLES });
+    return { times: [...times], ...path, warnings: [] };
+  } catch {
+    return null;
+  }
+}
 
 /** @param {any} question @returns {Promise<{path: any, problem: string}>} */
 async function answerTo(question) {

@@ -21,9 +21,9 @@ export async function showStyles(symbol, changed, current) {
   const styles = await stylesOf(symbol);
   if (!styles?.lowest.length || !current()) return;
   const values = styles.lowest.map(() => 0);
-  const box = make("input", { type: "checkbox", "data-key": "mix" });
-  const sliders = styles.lowest.slice(0, SHOWN).map((/** @type {number} */ low, /** @type {number} */ k) => {
-    const high = styles.highest[k];
+  const box = byId("style-mix");
+  const tell = () => changed(box.checked ? [...values] : null, styles.formulation);
+  const rows = styles.lowest.slice(0, SHOWN).map((/** @type {number} */ low, /** @type {number} */ k) => {
     const slider = make("input", {
       type: "range",
       min: "-100",
@@ -34,46 +34,18 @@ export async function showStyles(symbol, changed, current) {
     slider.value = "0";
     slider.addEventListener("input", () => {
       const at = Number(slider.value) / 100;
-      values[k] = at < 0 ? -at * low : at * high;
-      changed([...values], styles.formulation);
+      values[k] = at < 0 ? -at * low : at * styles.highest[k];
+      tell();
     });
-    return {
-      slider,
-      row: make(
-        "label",
-        { class: "style-row" },
-        make(
-          "span",
-          { class: "small" },
-          `Style ${k + 1}`,
-          make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`),
-        ),
-        slider,
-      ),
-    };
+    const share = make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`);
+    return make("label", { class: "style-row" }, make("span", { class: "small" }, `Style ${k + 1}`, share), slider);
   });
-  box.addEventListener("change", () => {
-    for (const { slider } of sliders) slider.disabled = !box.checked;
-    changed(box.checked ? [...values] : null, styles.formulation);
-  });
-  fill(
-    byId("style-rows"),
-    make(
-      "label",
-      { class: "check" },
-      box,
-      make(
-        "span",
-        {},
-        "Between its recordings",
-        make(
-          "span",
-          { class: "soft small says" },
-          `from their average in the ways they differ; moves as ${styles.formulation}`,
-        ),
-      ),
-    ),
-    ...sliders.map(({ row }) => row),
-  );
+  box.checked = false;
+  box.onchange = () => {
+    for (const row of rows) row.querySelector("input").disabled = !box.checked;
+    tell();
+  };
+  byId("style-says").textContent = `from their average in the ways they differ; moves as ${styles.formulation}`;
+  fill(byId("style-rows"), ...rows);
   byId("styles").hidden = false;
 }

@@ -1,38 +1,21 @@
 // Move: one symbol, its start, goal, via points, obstacles and duration; the path follows the hand.
 import { toMove } from "../parts/chosen.js";
-import { byId, fill, make } from "../parts/elements.js";
+import { byId } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
 import { library, onLibrary } from "../parts/library_state.js";
-import { isUndo } from "../parts/shortcuts.js";
+import { isRedo, isUndo } from "../parts/shortcuts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { addObstacle, addVia, showDragging, stretch, undoEdit } from "./edits.js";
-import { showFormulations } from "./formulations.js";
+import { addObstacle, addVia, grabPath, showDragging, step, stretch } from "./edits.js";
+import { startFormulations } from "./formulations.js";
 import { play, showPaths } from "./paths.js";
 import { showPick } from "./pick.js";
-import { chooseSymbol, save, tickFormulation } from "./requests.js";
-import { createSession } from "./session.js";
-
-/** @typedef {import("./session.js").Session} Session */
-
-function showExportFormats() {
-  const formats = library().formats.map((format) => format.replace(/^\./, ""));
-  if (byId("export-format").children.length === formats.length) return;
-  fill(byId("export-format"), ...formats.map((format) => make("option", { value: format }, format.toUpperCase())));
-}
+import { chooseSymbol, saveMovement, tickFormulations } from "./requests.js";
+import { Session } from "./session.js";
 
 /** Hide the parts of the view where no symbol can move, and say so. @param {boolean} empty */
 function showParts(empty) {
   byId("move-empty").hidden = !empty;
-  for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
-  for (const control of /** @type {const} */ ([
-    "move-play",
-    "add-via",
-    "add-obstacle",
-    "move-reset",
-    "export",
-    "duration",
-  ]))
-    byId(control).disabled = empty;
+  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
 }
 
 /** The view is shown, or the library changed. @param {Session} session */
@@ -40,7 +23,6 @@ function showView(session) {
   if (currentView() !== "move") return;
   const { symbols, version } = library();
   const id = toMove(symbols);
-  showExportFormats();
   showParts(id === null);
   showPick(id, (chosen) => chooseSymbol(session, chosen));
   if (id === null) session.plan = session.picture.plan = session.chosen = null;
@@ -54,7 +36,11 @@ function hearKey(session, event) {
   if (event.key === " " && !target.closest("button, input, select, summary, textarea, dialog")) {
     event.preventDefault();
     play(session);
-  } else if (isUndo(event)) undoEdit(session);
+  } else if (isUndo(event)) step(session, -1);
+  else if (isRedo(event)) {
+    event.preventDefault();
+    step(session, 1);
+  }
 }
 
 /** @param {Session} session */
@@ -62,8 +48,10 @@ function listen(session) {
   byId("move-play").addEventListener("click", () => play(session));
   byId("add-via").addEventListener("click", () => addVia(session));
   byId("add-obstacle").addEventListener("click", () => addObstacle(session));
+  byId("move-undo").addEventListener("click", () => step(session, -1));
+  byId("move-redo").addEventListener("click", () => step(session, 1));
   byId("move-reset").addEventListener("click", () => chooseSymbol(session, session.plan?.symbol));
-  byId("export").addEventListener("click", () => save(session));
+  byId("export").addEventListener("click", () => saveMovement(session));
   byId("duration").addEventListener("input", () => stretch(session));
   document.addEventListener("keydown", (event) => hearKey(session, event));
   const pick = () => showPick(session.plan?.symbol ?? null, (chosen) => chooseSymbol(session, chosen));
@@ -73,7 +61,7 @@ function listen(session) {
 }
 
 export function startMove() {
-  const session = createSession({ moved: showPaths, dragged: showDragging });
-  showFormulations((name, ticked) => tickFormulation(session, name, ticked));
+  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
+  startFormulations((names) => tickFormulations(session, names));
   listen(session);
 }

@@ -64,6 +64,8 @@ export const learn = (drawn, label) =>
     label === null ? "Saved without a name." : `Learned as ${label}.`,
     KNOWN,
   );
+/** @param {string} name */
+export const learnExample = (name) => change(() => post("/api/library/example", { name }), "The example is learned.");
 /** @param {string} id @param {string} name */
 export const rename = (id, name) => change(() => post(`${of(id)}/rename`, { name }), `Renamed to ${name}.`);
 /** @param {string} id @param {string} text */

@@ -31,6 +31,14 @@ export function make(tag, options = {}, ...children) {
   return element;
 }
 
+/** @param {string} text @param {() => any} act @param {Record<string, any>} options */
+export const button = (text, act, options = {}) =>
+  make("button", { class: "button", type: "button", ...options, on: { click: act } }, text);
+
+/** Offer names to choose from; the values are their numbers. @param {Element} select @param {string[]} names */
+export const offer = (select, names) =>
+  fill(select, ...names.map((name, k) => make("option", { value: String(k) }, name)));
+
 /** Say something else; what stays the same costs no layout. @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -69,83 +77,22 @@ export const breakable = (name) =>
 
 /**
  * Elements by their ids that are more than an HTMLElement.
- * @typedef {{
- *   "add-obstacle": HTMLButtonElement,
- *   "add-span": HTMLButtonElement,
- *   "add-via": HTMLButtonElement,
- *   "ask-yes": HTMLButtonElement,
- *   "draw-clear": HTMLButtonElement,
- *   "draw-how": HTMLButtonElement,
- *   "draw-move": HTMLButtonElement,
- *   "episodes-before": HTMLButtonElement,
- *   "episodes-next": HTMLButtonElement,
- *   "draw-replay": HTMLButtonElement,
- *   "draw-save": HTMLButtonElement,
- *   "learn-file": HTMLButtonElement,
- *   "learn-spans": HTMLButtonElement,
- *   "move-play": HTMLButtonElement,
- *   "move-reset": HTMLButtonElement,
- *   "naming-learn": HTMLButtonElement,
- *   "play-recording": HTMLButtonElement,
- *   "robot-draw": HTMLButtonElement,
- *   "robot-go": HTMLButtonElement,
- *   "save-corrections": HTMLButtonElement,
- *   "show-unlabeled": HTMLButtonElement,
- *   "spot-page": HTMLButtonElement,
- *   "zoom-in": HTMLButtonElement,
- *   "zoom-out": HTMLButtonElement,
- *   clear: HTMLButtonElement,
- *   export: HTMLButtonElement,
- *   help: HTMLButtonElement,
- *   merge: HTMLButtonElement,
- *   play: HTMLButtonElement,
- *   reset: HTMLButtonElement,
- *   save: HTMLButtonElement,
- *   spot: HTMLButtonElement,
- *   undo: HTMLButtonElement,
- *   "draw-canvas": HTMLCanvasElement,
- *   "move-canvas": HTMLCanvasElement,
- *   "plot-acceleration": HTMLCanvasElement,
- *   "plot-speed": HTMLCanvasElement,
- *   "timeline-canvas": HTMLCanvasElement,
- *   canvas: HTMLCanvasElement,
- *   map: HTMLCanvasElement,
- *   stage: HTMLCanvasElement,
- *   "wand-canvas": HTMLCanvasElement,
- *   "live-source": HTMLDetailsElement,
- *   "robot-preflight": HTMLDetailsElement,
- *   history: HTMLDetailsElement,
- *   why: HTMLDetailsElement,
- *   ask: HTMLDialogElement,
- *   keys: HTMLDialogElement,
- *   phone: HTMLDialogElement,
- *   "pick-part": HTMLFieldSetElement,
- *   channels: HTMLFieldSetElement,
- *   formulations: HTMLFieldSetElement,
- *   styles: HTMLFieldSetElement,
- *   "ask-name": HTMLInputElement,
- *   "episodes-from": HTMLInputElement,
- *   "find-pick": HTMLInputElement,
- *   "find-symbol": HTMLInputElement,
- *   "naming-name": HTMLInputElement,
- *   "phone-host": HTMLInputElement,
- *   "robot-dragged": HTMLInputElement,
- *   "robot-size": HTMLInputElement,
- *   "robot-slow": HTMLInputElement,
- *   duration: HTMLInputElement,
- *   file: HTMLInputElement,
- *   find: HTMLInputElement,
- *   playhead: HTMLInputElement,
- *   tilt: HTMLInputElement,
- *   time: HTMLInputElement,
- *   turn: HTMLInputElement,
- *   "export-format": HTMLSelectElement,
- *   "robot-arm": HTMLSelectElement,
- *   "robot-what": HTMLSelectElement,
- *   camera: HTMLSelectElement,
- *   formulation: HTMLSelectElement,
- *   tables: HTMLSelectElement,
- *   spans: HTMLTableElement,
- *   video: HTMLVideoElement,
- * }} Elements
+ * @typedef {Record<"add-obstacle"|"add-span"|"add-via"|"ask-yes"|"clear"|"draw-clear"|"draw-move"|"draw-replay"|
+ *     "draw-save"|"episodes-before"|"episodes-next"|"export"|"help"|"learn-file"|"learn-spans"|"merge"|
+ *     "move-play"|"move-redo"|"move-reset"|"move-undo"|"naming-learn"|"play"|"play-recording"|"read-as"|
+ *     "redo-span"|"reset"|"robot-free"|"robot-go"|"robot-save"|"save"|"save-corrections"|"save-spans"|
+ *     "show-unlabeled"|"spot"|"spot-page"|"undo"|"undo-span"|"zoom-in"|"zoom-out", HTMLButtonElement>
+ *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"shape"|
+ *     "stage"|"timeline-canvas"|"wand-canvas", HTMLCanvasElement>
+ *   & Record<"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
+ *     "why", HTMLDetailsElement>
+ *   & Record<"ask"|"importing"|"keys"|"phone", HTMLDialogElement>
+ *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|
+ *     "own-video"|"phone-host"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|"tilt"|"time"|"turn"|
+ *     "video-start", HTMLInputElement>
+ *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|"save-format"|
+ *     "tables", HTMLSelectElement>
+ *   & Record<"importing-rows"|"spans", HTMLTableElement>
+ *   & Record<"video", HTMLVideoElement>} Elements
  */

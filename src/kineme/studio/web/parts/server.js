@@ -1,4 +1,4 @@
-// The library of a server, in four functions; the page without a server has the same of a snapshot.
+// The library of a server, in five functions; the page without a server has the same of a snapshot.
 import { post } from "./api.js";
 import { library } from "./library_state.js";
 import { Sending } from "./sending.js";
@@ -14,6 +14,7 @@ import { Sending } from "./sending.js";
  * @typedef {Object} Backend
  * @property {() => {id: string, name: string, path: number[][]|null}[]} symbols
  * @property {(movement: Movement) => any} recognize An answer, or a promise of it.
+ * @property {(movement: Movement, answer: any) => any} explain Its explanation, or a promise of it.
  * @property {(hear: (message: any) => any) => Following} follow
  * @property {(question: any) => any} generate A new movement, or a promise of it.
  */
@@ -22,6 +23,7 @@ import { Sending } from "./sending.js";
 export const server = {
   symbols: () => library().symbols,
   recognize: (movement) => post("/api/recognize", movement),
+  explain: (movement) => post("/api/why", movement),
   follow: (/** @type {(message: any) => boolean} */ send) => new Sending(send),
   generate: (question) => post("/api/rollout", question),
 };

@@ -1,5 +1,6 @@
 // Short messages at the edge: what was done, how to take it back, what went wrong.
-import { byId, make } from "./elements.js";
+import { download } from "./api.js";
+import { button, byId, make } from "./elements.js";
 
 const STAYS = 7000; // [ms]
 
@@ -15,8 +16,7 @@ export function say(text, { act, action, failed = false } = {}) {
     close();
     act();
   };
-  if (act) toast.append(make("button", { class: "button", type: "button", on: { click: takeBack } }, action ?? "Undo"));
-  else toast.append(make("button", { class: "button", type: "button", on: { click: close } }, "Close"));
+  toast.append(act ? button(action ?? "Undo", takeBack) : button("Close", close));
   byId("toasts").append(toast);
   while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();
   let timer = setTimeout(close, failed ? 2 * STAYS : STAYS);
@@ -35,4 +35,10 @@ export async function tried(act) {
     if (error.name !== "AbortError") say(error.message, { failed: true });
     return undefined;
   }
+}
+
+/** Ask for a file, and say under which name it is saved. @param {string} path @param {any} body @param {string} name */
+export async function save(path, body, name) {
+  const saved = await tried(() => download(path, body, name));
+  if (saved) say(`Saved as ${saved}.`);
 }

@@ -2,44 +2,48 @@
 import { request } from "../parts/api.js";
 import { byId, counted } from "../parts/elements.js";
 import { currentView, show } from "../parts/views.js";
+import { askHow } from "./importing.js";
+
+/** @param {string} text @param {boolean} [wrong] */
+function state(text, wrong = false) {
+  byId("drop-state").textContent = text;
+  byId("drop-state").classList.toggle("went-wrong", wrong);
+}
 
 /**
  * @param {File} file
  * @param {AbortSignal} signal
- * @returns {Promise<any>} What the server read; undefined where it did not.
+ * @returns {Promise<any>} What the server read, as the person says; undefined where it did not.
  */
 async function send(file, signal) {
-  byId("drop-state").textContent = `Reading ${file.name} …`;
-  byId("drop-state").classList.remove("went-wrong");
+  state(`Reading ${file.name} …`);
   const headers = { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" };
   try {
     const response = await request("/api/recordings", { method: "POST", body: file, headers, signal });
-    byId("drop-state").textContent = "";
-    return await response.json();
+    const read = await response.json();
+    state("");
+    const clear = read.unclear ? await askHow(read, file.name) : read;
+    if (clear || read.tables.length) return clear ?? read;
+    state(`${file.name} was not opened.`);
   } catch (error) {
-    if (signal.aborted) return undefined;
-    byId("drop-state").textContent =
-      error.status === undefined
-        ? `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.`
-        : error.message;
-    byId("drop-state").classList.add("went-wrong");
-    return undefined;
+    const folder = `${file.name} cannot be sent: expected a file. The command kineme learn reads folders.`;
+    if (!signal.aborted) state(error.status === undefined ? folder : error.message, true);
   }
 }
 
-/** @param {(recording: any, name: string) => void} read */
-export function startDropping(read) {
+/** @param {(recording: any, name: string) => void} read @param {(file: File) => boolean} film Takes a video. */
+export function startDropping(read, film) {
   let sending = new AbortController();
   const take = async (/** @type {FileList|undefined} */ files) => {
     const file = files?.[0];
-    if (!file) return;
+    if (!file || (file.type.startsWith("video/") && film(file))) return;
     sending.abort(); // only the last file is wanted
     sending = new AbortController();
     const recording = await send(file, sending.signal);
-    if (recording) read(recording, file.name);
-    if (recording && files.length > 1)
-      byId("drop-state").textContent =
-        `One file at a time: ${file.name} is shown, ${counted(files.length - 1, "other")} not read.`;
+    if (!recording) return;
+    read(recording, file.name);
+    const others = files.length - 1;
+    if (others) state(`One file at a time: ${file.name} is shown, ${counted(others, "other")} not read.`);
   };
   byId("file").addEventListener("change", (/** @type {any} */ event) =>
     take(event.target.files).finally(() => (event.target.value = "")),

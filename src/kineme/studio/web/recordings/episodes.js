@@ -5,6 +5,7 @@ import { byId, counted, fill, write } from "../parts/elements.js";
 import { onLibrary } from "../parts/library_state.js";
 import { say, tried } from "../parts/toasts.js";
 import { onShow } from "../parts/views.js";
+import { plain } from "./spans.js";
 import { Strip } from "./strip.js";
 
 const PAGE = 20; // episodes
@@ -32,12 +33,11 @@ export class Episodes {
     this.search = null;
     /** @type {Strip[]} */
     this.strips = [];
-    onShow("recordings", () => this.answer || tried(() => this.turn(0)));
-    byId("episodes-before").addEventListener("click", () => tried(() => this.turn(this.offset - PAGE)));
-    byId("episodes-next").addEventListener("click", () => tried(() => this.turn(this.offset + PAGE)));
-    byId("episodes-from").addEventListener("change", () =>
-      tried(() => this.turn((byId("episodes-from").valueAsNumber || 1) - 1)),
-    );
+    const turn = (/** @type {number} */ offset) => tried(() => this.turn(offset));
+    onShow("recordings", () => this.answer || turn(0));
+    byId("episodes-before").addEventListener("click", () => turn(this.offset - PAGE));
+    byId("episodes-next").addEventListener("click", () => turn(this.offset + PAGE));
+    byId("episodes-from").addEventListener("change", () => turn((byId("episodes-from").valueAsNumber || 1) - 1));
     byId("spot-page").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("save-corrections").addEventListener("click", () => tried(() => this.save()));
     byId("strips").addEventListener("keydown", (event) => this.key(event));
@@ -100,9 +100,9 @@ export class Episodes {
     if (!detail) return;
     this.opened = detail.recording;
     this.mark();
-    const address = (/** @type {any} */ { camera }) => `${of(detail.recording)}/videos/${encodeURIComponent(camera)}`;
-    const videos = detail.videos.map((/** @type {any} */ video) => ({ ...video, address: address(video) }));
-    this.page.open({ ...detail, videos });
+    for (const video of detail.videos)
+      video.address = `${of(detail.recording)}/videos/${encodeURIComponent(video.camera)}`;
+    this.page.open(detail);
   }
 
   /**
@@ -110,10 +110,7 @@ export class Episodes {
    * @param {string} key @param {any[]} spans @param {boolean} corrected Whether a person has changed any.
    */
   put(key, spans, corrected) {
-    const body = {
-      spans: spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence })),
-      corrected,
-    };
+    const body = { spans: plain(spans), corrected };
     if (corrected) {
       this.saved = false;
       byId("download-corrections").hidden = false;

@@ -9,20 +9,22 @@ const moving = (/** @type {any[]} */ channels) =>
   channels.reduce((sum, channel) => sum + (channel.kind === "orientation" ? 3 : channel.columns?.length || 1), 0);
 
 /**
- * Names of the channels that are chosen at first.
+ * Names of the channels that are chosen at first: those of the library, or the default ones, or as many as fit.
  * @param {any[]} channels
  * @param {any} library
+ * @param {string[]} [usual] Of an episode, those of its first feature.
  * @returns {Set<string>}
  */
-export function fitting(channels, { n_dims: wanted, channels: ours, symbols }) {
-  const names = (/** @type {any[]} */ some) => new Set(some.map((channel) => channel.name));
-  if (!symbols.length || moving(channels) === wanted) return names(channels);
-  const alike = channels.filter((channel) => ours?.some((/** @type {any} */ other) => other.name === channel.name));
-  if (moving(alike) === wanted) return names(alike);
+export function fitting(channels, { n_dims: wanted, channels: ours, symbols }, usual) {
+  const named = (/** @type {string[]} */ names) => channels.filter(({ name }) => names.includes(name));
+  const alike = named((ours ?? []).map((/** @type {any} */ channel) => channel.name));
+  /** @type {any[]} */
   const first = [];
   for (const channel of channels)
     if (channel.kind === "position" && moving([...first, channel]) <= wanted) first.push(channel);
-  return moving(first) === wanted ? names(first) : names(channels);
+  const all = [ours?.length === alike.length ? alike : [], usual ? named(usual) : channels, channels, first];
+  const fits = (/** @type {any[]} */ some) => some.length && (!symbols.length || moving(some) === wanted);
+  return new Set((all.find(fits) ?? channels).map(({ name }) => name));
 }
 
 /**

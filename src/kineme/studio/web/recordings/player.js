@@ -1,10 +1,10 @@
 // The playhead of a recording: played, stepped through, with the video of a camera beside it where there is one.
-import { byId, fill, make, write } from "../parts/elements.js";
+import { byId, offer, write } from "../parts/elements.js";
 
 const STEP = 0.1; // of an arrow key [s]; ten times as much with Shift
 const NEAR = 0.05; // a video that is so near the playhead stays where it is [s]
 
-/** @typedef {{camera: string, start: number, codec: string|null, address: string}} Video */
+/** @typedef {{camera: string, start: number, codec: string|null, address: string, own?: boolean}} Video */
 
 export class Player {
   /** @param {(time: number) => void} moved */
@@ -21,6 +21,13 @@ export class Player {
     this.film = byId("video");
     this.film.addEventListener("error", () => this.fail());
     this.film.addEventListener("loadedmetadata", () => (this.film.videoWidth ? this.follow() : this.fail()));
+    byId("video-start").addEventListener("input", () => {
+      if (this.video) this.video.start = byId("video-start").valueAsNumber || 0;
+      this.follow();
+    });
+    byId("own-video").addEventListener("change", (/** @type {any} */ event) => {
+      if (event.target.files.length) this.add(event.target.files[0]);
+    });
     byId("camera").addEventListener("change", () => this.show(Number(byId("camera").value)));
     byId("play-recording").addEventListener("click", () => this.toggle());
     byId("playhead").addEventListener("input", () => this.seek(byId("playhead").valueAsNumber));
@@ -32,17 +39,35 @@ export class Player {
     this.pause();
     Object.assign(this, { end, videos });
     byId("playhead").max = String(end);
-    byId("video-part").hidden = !videos.length;
-    byId("camera-part").hidden = videos.length < 2;
-    fill(byId("camera"), ...videos.map(({ camera }, k) => make("option", { value: String(k) }, camera)));
-    this.show(0);
+    this.list(0);
     this.seek(0);
+  }
+
+  /** A video of the person's, which stays in the browser. @param {File} file */
+  add(file) {
+    this.videos.push({ camera: file.name, start: 0, codec: null, address: URL.createObjectURL(file), own: true });
+    this.list(this.videos.length - 1);
+    return true;
+  }
+
+  /** Offer all videos, and show one. @param {number} k */
+  list(k) {
+    byId("video-part").hidden = !this.videos.length;
+    byId("camera-part").hidden = this.videos.length < 2;
+    offer(
+      byId("camera"),
+      this.videos.map(({ camera }) => camera),
+    );
+    byId("camera").value = String(k);
+    this.show(k);
   }
 
   /** The video of a camera. @param {number} k */
   show(k) {
     this.video = this.videos[k] ?? null;
     this.film.hidden = !this.video;
+    byId("video-start-part").hidden = !this.video?.own;
+    byId("video-start").value = String(this.video?.start ?? 0);
     write(byId("video-note"), "");
     if (!this.video) {
       this.film.removeAttribute("src");
@@ -50,7 +75,6 @@ export class Player {
     }
     this.film.setAttribute("aria-label", `Video of ${this.video.camera}`);
     this.film.src = this.video.address;
-    if (this.playing) this.film.play().catch(() => {}); // an error of the video says more
   }
 
   /** Say that the browser cannot play what is shown; the playhead goes on without it. */
@@ -73,17 +97,11 @@ export class Player {
   }
 
   toggle() {
-    if (this.playing) this.pause();
-    else this.play();
-  }
-
-  play() {
-    if (!this.end) return;
+    if (this.playing || !this.end) return this.pause();
     if (this.at >= this.end) this.seek(0);
     this.playing = true;
     write(byId("play-recording"), "Pause");
     this.last = performance.now();
-    if (this.video) this.film.play().catch(() => {});
     requestAnimationFrame(() => this.tick());
   }
 
@@ -97,8 +115,13 @@ export class Player {
   tick() {
     if (!this.playing) return;
     const now = performance.now();
-    const filmed = this.video && this.film.readyState && !this.film.paused && !this.film.ended;
-    const time = filmed ? this.film.currentTime - this.video.start : this.at + (now - this.last) / 1000;
+    const due = this.video && this.film.readyState && !this.film.ended && this.at + this.video.start >= 0;
+    if (due && this.film.paused) {
+      this.follow();
+      this.film.play().catch(() => {}); // an error of the video says more
+    }
+    const time =
+      due && !this.film.paused ? this.film.currentTime - this.video.start : this.at + (now - this.last) / 1000;
     this.last = now;
     this.go(time);
     if (this.at >= this.end) this.pause();

@@ -1,73 +1,62 @@
 // What was found, as a table: times and names can be typed, a row can be removed.
-import { byId, fill, keepingFocus, make } from "../parts/elements.js";
+import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 
-export const BY_HAND = { p: null, confidence: null }; // they were of what was found
+export const BY_HAND = { p: null, confidence: null, certainty: null }; // they were of what was found
 
-/** @param {any[]} spans @param {number} chosen @param {{choose: (k: number) => void, changed: () => void}} page */
+/** What the server is told of spans. @param {any[]} spans */
+export const plain = (spans) =>
+  spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence }));
+
+/**
+ * @param {any[]} spans
+ * @param {number} chosen
+ * @param {{choose: (k: number) => void, changed: () => void, remove: (k: number) => void}} page
+ */
 export function showSpans(spans, chosen, page) {
-  const time = (/** @type {any} */ span, /** @type {number} */ k, /** @type {"begin"|"end"} */ which) => {
-    const field = make("input", {
-      type: "number",
-      step: "0.01",
-      "aria-label": `${which === "begin" ? "Begin" : "End"} of span ${k + 1}`,
-      "data-key": `span ${k} ${which}`,
-      on: { focus: () => page.choose(k) },
+  const row = (/** @type {any} */ span, /** @type {number} */ k) => {
+    /** @type {(which: "begin"|"end"|"label", words: string, options: any) => HTMLElement} */
+    const field = (which, words, options) => {
+      const input = make("input", {
+        "aria-label": `${words} of span ${k + 1}`,
+        "data-key": `span ${k} ${which === "label" ? "name" : which}`,
+        on: { focus: () => page.choose(k) },
+        ...options,
+      });
+      const isTime = which !== "label";
+      input.value = isTime ? span[which].toFixed(2) : (span.label ?? "");
+      input.addEventListener("change", () => {
+        const value = isTime ? input.valueAsNumber : input.value.trim() || null;
+        if (!Number.isNaN(value)) Object.assign(span, { [which]: value, ...BY_HAND });
+        page.changed();
+      });
+      return make("td", { class: isTime ? null : "wide" }, input);
+    };
+    const time = { type: "number", step: "0.01", readOnly: k !== chosen };
+    const p = span.p?.toFixed(2) ?? "–";
+    const away = button("×", () => page.remove(k), {
+      ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, hidden: k !== chosen },
     });
-    field.value = span[which].toFixed(2);
-    field.addEventListener("change", () => {
-      if (Number.isFinite(field.valueAsNumber)) Object.assign(span, { [which]: field.valueAsNumber, ...BY_HAND });
-      page.changed();
-    });
-    return field;
-  };
-  const name = (/** @type {any} */ span, /** @type {number} */ k) => {
-    const field = make("input", {
-      type: "text",
-      list: "names",
-      maxlength: "200",
-      placeholder: "unknown",
-      "aria-label": `Name of span ${k + 1}`,
-      "data-key": `span ${k} name`,
-      on: { focus: () => page.choose(k) },
-    });
-    field.value = span.label ?? "";
-    field.addEventListener("change", () => {
-      Object.assign(span, { label: field.value.trim() || null, ...BY_HAND });
-      page.changed();
-    });
-    return field;
-  };
-  const remove = (/** @type {number} */ k) => {
-    spans.splice(k, 1);
-    page.choose(-1);
-    page.changed();
-  };
-  const away = (/** @type {number} */ k) =>
-    make(
-      "button",
-      {
-        class: "button quiet square",
-        type: "button",
-        "aria-label": `Remove span ${k + 1}`,
-        on: { click: () => remove(k) },
-      },
-      "×",
-    );
-  const row = (/** @type {any} */ span, /** @type {number} */ k) =>
-    make(
+    return make(
       "tr",
-      { class: k === chosen ? "chosen" : null },
-      make("td", {}, time(span, k, "begin")),
-      make("td", {}, time(span, k, "end")),
-      make("td", { class: "wide" }, name(span, k)),
-      make("td", {}, span.p === null || span.p === undefined ? "–" : span.p.toFixed(2)),
-      make("td", {}, away(k)),
+      { class: k === chosen ? "chosen" : null, on: { click: () => page.choose(k) } },
+      field("begin", "Begin", time),
+      field("end", "End", time),
+      field("label", "Name", { type: "text", list: "names", maxLength: "200", placeholder: "unknown" }),
+      make("td", { title: `p-value: ${p}` }, span.certainty ?? p),
+      make("td", {}, away),
     );
+  };
   byId("spans").hidden = !spans.length;
   keepingFocus(() => fill(byId("spans").tBodies[0], ...spans.map(row)));
 }
 
-/** Mark the row of the chosen one. @param {number} chosen */
+/** Mark the row of the chosen one; its times can be typed. @param {number} chosen */
 export function markRow(chosen) {
-  for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) row.classList.toggle("chosen", k === chosen);
+  for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) {
+    row.classList.toggle("chosen", k === chosen);
+    for (const part of row.querySelectorAll("button")) part.hidden = k !== chosen;
+    /** @type {NodeListOf<HTMLInputElement>} */
+    const times = row.querySelectorAll("[type=number]");
+    for (const time of times) time.readOnly = k !== chosen;
+  }
 }

@@ -15,6 +15,45 @@ export const colorOf = (label) => {
   return color(symbol ? lookOf(symbol.id).color : "--gray");
 };
 
+/**
+ * Spans as bars with their names; those that overlap lie in lanes, one below the other.
+ * @param {CanvasRenderingContext2D} context
+ * @param {any[]} spans
+ * @param {(time: number) => number} x [px]
+ * @param {number[]} place Top and height [px].
+ * @param {number} chosen
+ */
+export function paintLanes(context, spans, x, [top, height], chosen = -1) {
+  const lanes = lanesOf(spans);
+  const tall = height / Math.max(...lanes, 1);
+  Object.assign(context, { font: `600 ${Math.min(13, tall - 4)}px ${color("--font")}`, textAlign: "center" });
+  for (const [k, { begin, end, label }] of spans.entries()) {
+    const [paint, name, y] = [colorOf(label), label ?? "unknown", top + (lanes[k] - 1) * tall];
+    const [left, wide] = [x(begin), Math.max(x(end) - x(begin) - 1, 2)];
+    Object.assign(context, { fillStyle: paint, globalAlpha: label === null ? 0.25 : 1 });
+    context.beginPath();
+    context.roundRect(left, y + 1, wide, tall - 2, 5);
+    context.fill();
+    context.globalAlpha = 1;
+    if (k === chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
+    context.fillStyle = label === null ? color("--text") : readableOn(paint);
+    if (context.measureText(name).width < wide - 6) context.fillText(name, left + wide / 2, y + tall / 2 + 4);
+  }
+}
+
+/** The lane of each span, from 1: the first in which no earlier one lies beside it. @param {any[]} spans */
+export function lanesOf(spans) {
+  /** @type {number[]} */
+  const ends = [];
+  const lanes = spans.map(() => 1);
+  for (const k of [...spans.keys()].sort((a, b) => spans[a].begin - spans[b].begin)) {
+    const free = ends.findIndex((end) => end <= spans[k].begin);
+    lanes[k] = (free < 0 ? ends.length : free) + 1;
+    ends[lanes[k] - 1] = spans[k].end;
+  }
+  return lanes;
+}
+
 export class Strip {
   /** @param {(strip: Strip) => void} open */
   constructor(open) {
@@ -110,13 +149,6 @@ export class Strip {
         color: color(COLORS[k % COLORS.length]),
         width: 1,
       });
-    Object.assign(context, { font: `600 11px ${color("--font")}`, textAlign: "center" });
-    for (const { begin, end, label } of spans) {
-      const [paint, name, wide] = [colorOf(label), label ?? "unknown", Math.max(x(end) - x(begin) - 1, 2)];
-      Object.assign(context, { fillStyle: paint, globalAlpha: label === null ? 0.25 : 1 });
-      context.fillRect(x(begin), height - LANE, wide, LANE);
-      Object.assign(context, { fillStyle: label === null ? color("--text") : readableOn(paint), globalAlpha: 1 });
-      if (context.measureText(name).width < wide - 6) context.fillText(name, x(begin) + wide / 2, height - 4);
-    }
+    paintLanes(context, spans, x, [height - LANE, LANE]);
   }
 }

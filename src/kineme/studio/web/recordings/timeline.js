@@ -1,16 +1,19 @@
-// The recording over time: its columns, what was found, and the edges of the span that is chosen.
+// The recording over time: its columns, the shapes and names of what was found, the edges of the span that is chosen.
 import { Board, color } from "../parts/canvas.js";
 import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
 import { COLORS } from "../parts/library_state.js";
-import { readableOn } from "../parts/lines.js";
+import { line } from "../parts/lines.js";
+import { placed } from "./shapes.js";
 import { signal } from "./signal.js";
 import { BY_HAND } from "./spans.js";
-import { colorOf } from "./strip.js";
+import { colorOf, lanesOf, paintLanes } from "./strip.js";
 
-const BAND = 40; // height of the spans [px]
+const BAND = 36; // height of the names [px]
+const SHAPE = 72; // of the shapes above them
 const SIDE = 12;
-const AXIS = 22;
+const AXIS = 26;
+const LEAST = 0.02; // duration of a span [s]
 
 /** @typedef {{begin: number, end: number, label: string|null, p: number|null, confidence?: number|null}} Span */
 
@@ -18,6 +21,8 @@ const AXIS = 22;
  * @typedef {Object} Page
  * @property {(k: number) => void} choose
  * @property {() => void} changed By the person.
+ * @property {() => void} add
+ * @property {(k: number) => void} remove
  * @property {(time: number) => void} seek
  * @property {(event: KeyboardEvent) => void} key For the playhead.
  */
@@ -29,17 +34,21 @@ export class Timeline {
     this.plot = { times: [0, 1], columns: [] };
     /** @type {Span[]} */
     this.spans = [];
+    /** @type {WeakMap<any, import("./shapes.js").Shape>} */
+    this.shapes = new WeakMap();
     this.chosen = -1;
     this.range = [0, 1];
     this.head = 0; // where the playhead is [s]
-    this.board = new Board(byId("timeline-canvas"), () => this.paint());
+    const canvas = byId("timeline-canvas");
+    this.board = new Board(canvas, () => this.paint());
     this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
     byId("edges").append(this.playhead);
     this.edges = ["begin", "end"].map((which) => this.edge(/** @type {"begin"|"end"} */ (which)));
-    this.board.canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    this.board.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    this.board.canvas.addEventListener("keydown", (event) => this.key(event));
-    this.board.canvas.tabIndex = 0;
+    canvas.addEventListener("pointerdown", (event) => this.grab(event));
+    canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("dblclick", () => (this.chosen < 0 ? this.page.add() : this.name()));
+    canvas.tabIndex = 0;
   }
 
   /** @param {any} plot */
@@ -52,49 +61,45 @@ export class Timeline {
     this.board.draw();
   }
 
+  /** Seconds in a pixel. */
+  get scale() {
+    return (this.range[1] - this.range[0]) / (this.board.width - 2 * SIDE);
+  }
+
   x(/** @type {number} */ time) {
-    return SIDE + ((time - this.range[0]) / (this.range[1] - this.range[0])) * (this.board.width - 2 * SIDE);
+    return SIDE + (time - this.range[0]) / this.scale;
   }
 
   time(/** @type {number} */ x) {
-    return this.range[0] + ((x - SIDE) / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]);
+    return this.range[0] + (x - SIDE) * this.scale;
   }
 
   paint() {
     const { context, height } = this.board;
-    const lane = height - BAND - AXIS - 12;
-    for (const [k, span] of this.spans.entries()) this.paintSpan(span, k);
+    const top = height - BAND - AXIS;
+    for (const [k, span] of this.spans.entries()) this.paintSpan(span, k === this.chosen, top);
+    paintLanes(context, this.spans, (time) => this.x(time), [top, BAND], this.chosen);
     const x = this.plot.times.map((/** @type {number} */ time) => this.x(time));
-    this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
+    for (const [k, column] of /** @type {any[]} */ (this.plot.columns).entries()) {
       const look = { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.4 };
-      signal(context, x, column.values, [8, 8 + lane], look);
-    });
+      signal(context, x, column.values, [8, top - 12 - (this.spans.length ? SHAPE : 0)], look);
+    }
     this.paintAxis();
     this.placeEdges();
-    this.placeHead();
+    this.goTo(this.head);
   }
 
-  /** @param {Span} span @param {number} k */
-  paintSpan(span, k) {
-    const { context, height } = this.board;
-    const [x, w] = [this.x(span.begin), Math.max(this.x(span.end) - this.x(span.begin), 2)];
-    const paint = colorOf(span.label);
-    const top = height - BAND - AXIS;
-    Object.assign(context, { fillStyle: paint, strokeStyle: paint, globalAlpha: k === this.chosen ? 0.2 : 0.09 });
-    context.fillRect(x, 0, w, top);
-    context.globalAlpha = span.label === null ? 0.25 : 0.9;
-    context.beginPath();
-    context.roundRect(x + 1, top + 4, Math.max(w - 2, 1), BAND - 8, 6);
-    context.fill();
+  /** @param {Span} span @param {boolean} isChosen @param {number} bottom */
+  paintSpan(span, isChosen, bottom) {
+    const { context, width } = this.board;
+    const [x, paint, shape] = [this.x(span.begin), colorOf(span.label), this.shapes.get(span)];
+    const w = Math.max(this.x(span.end) - x, 2);
+    Object.assign(context, { fillStyle: paint, globalAlpha: isChosen ? 0.2 : 0.09 });
+    context.fillRect(x, 0, w, bottom);
     context.globalAlpha = 1;
-    if (k === this.chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
-    Object.assign(context, {
-      font: `600 13px ${color("--font")}`,
-      textAlign: "center",
-      fillStyle: span.label === null ? color("--text") : readableOn(paint),
-    });
-    const text = span.label ?? "unknown";
-    if (context.measureText(text).width < w - 10) context.fillText(text, x + w / 2, top + BAND / 2 + 5);
+    if (!shape?.path.length || w < 14 || x > width || x + w < 0) return;
+    const middle = [x + w / 2, bottom - SHAPE / 2];
+    line(context, placed(shape, middle, Math.min(w - 2, SHAPE)), { color: paint, width: 2 });
   }
 
   paintAxis() {
@@ -114,11 +119,7 @@ export class Timeline {
   /** @param {"begin"|"end"} which */
   edge(which) {
     const button = make("button", {
-      class: "edge",
-      type: "button",
-      role: "slider",
-      hidden: true,
-      "data-key": `edge ${which}`,
+      ...{ class: "edge", type: "button", role: "slider", hidden: true, "data-key": `edge ${which}` },
     });
     const go = (/** @type {PointerEvent} */ now) =>
       this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
@@ -129,12 +130,10 @@ export class Timeline {
     });
     button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
-      if (!step) return;
+      if (!step) return this.key(event);
       event.preventDefault();
-      this.moveEdge(
-        which,
-        this.spans[this.chosen][which] + (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500,
-      );
+      const by = (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500;
+      this.moveEdge(which, this.spans[this.chosen][which] + by);
       this.page.changed();
     });
     byId("edges").append(button);
@@ -145,11 +144,10 @@ export class Timeline {
   moveEdge(which, time) {
     const span = this.spans[this.chosen];
     if (!span) return; // another finger has chosen none
-    const least = 0.02;
     span[which] =
       which === "begin"
-        ? Math.min(Math.max(time, this.extent[0]), span.end - least)
-        : Math.max(Math.min(time, this.extent[1]), span.begin + least);
+        ? Math.min(Math.max(time, this.extent[0]), span.end - LEAST)
+        : Math.max(Math.min(time, this.extent[1]), span.begin + LEAST);
     Object.assign(span, BY_HAND);
     this.board.now();
   }
@@ -157,11 +155,7 @@ export class Timeline {
   /** Move the playhead. @param {number} time */
   goTo(time) {
     this.head = time;
-    this.placeHead();
-  }
-
-  placeHead() {
-    const x = this.x(this.head);
+    const x = this.x(time);
     this.playhead.hidden = x < 0 || x > this.board.width;
     this.playhead.style.setProperty("--x", `${x}px`);
   }
@@ -189,11 +183,11 @@ export class Timeline {
    */
   grab(event) {
     const at = this.time(event.offsetX);
-    const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
-    const go = (/** @type {PointerEvent} */ now) =>
-      this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
-    if (!drag(this.board.canvas, event, go)) return;
-    this.page.choose(hit);
+    if (!drag(this.board.canvas, event, (now) => this.pan(-now.movementX * this.scale))) return;
+    const lanes = lanesOf(this.spans);
+    const lane = Math.ceil(((event.offsetY - this.board.height + BAND + AXIS) * Math.max(...lanes)) / BAND);
+    const hits = [...this.spans.keys()].filter((k) => this.spans[k].begin <= at && at <= this.spans[k].end);
+    this.page.choose(hits.find((k) => lanes[k] === lane) ?? hits[0] ?? -1);
     this.page.seek(at);
   }
 
@@ -205,35 +199,38 @@ export class Timeline {
   }
 
   zoom(/** @type {number} */ factor, around = (this.range[0] + this.range[1]) / 2) {
-    const [low, high] = this.extent;
-    const length = Math.min(Math.max((this.range[1] - this.range[0]) * factor, (high - low) / 2000), high - low);
-    const share = (around - this.range[0]) / (this.range[1] - this.range[0]);
-    const from = Math.min(Math.max(around - share * length, low), high - length);
-    this.range = [from, from + length];
-    this.board.draw();
+    const [[low, high], [from, to]] = [this.extent, this.range];
+    const length = Math.min(Math.max((to - from) * factor, (high - low) / 2000), high - low);
+    const begin = around - ((around - from) / (to - from)) * length;
+    this.range = [begin, begin + length];
+    this.pan(0);
   }
 
   /** @param {WheelEvent} event */
   wheel(event) {
     const isAll = this.range[0] === this.extent[0] && this.range[1] === this.extent[1];
-    if (isAll && event.deltaY > Math.abs(event.deltaX)) return; // nothing is left to show: the page scrolls
-    if (Math.abs(event.deltaX) > Math.abs(event.deltaY))
-      this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
+    const isAcross = Math.abs(event.deltaX) > Math.abs(event.deltaY);
+    if (isAll && event.deltaY > 0 && !isAcross) return; // nothing is left to show: the page scrolls
+    if (isAcross) this.pan(event.deltaX * this.scale);
     else this.zoom(1.0015 ** event.deltaY, this.time(event.offsetX));
     event.preventDefault();
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
+    const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
     if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1 / 0.7);
-    else if (event.key === "ArrowUp" || event.key === "ArrowDown")
-      this.page.choose(
-        Math.min(Math.max(this.chosen + (event.key === "ArrowDown" ? 1 : -1), 0), this.spans.length - 1),
-      );
-    else if (event.key === "Enter" && this.chosen >= 0)
-      /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
+    else if (step) this.page.choose(Math.min(Math.max(this.chosen + step, 0), this.spans.length - 1));
+    else if (event.key === "Enter" && this.chosen >= 0) this.name();
+    else if (event.key === "Delete" && this.chosen >= 0) this.page.remove(this.chosen);
+    else if (event.key === "Insert") this.page.add();
     else return this.page.key(event);
     event.preventDefault();
+  }
+
+  /** Let the person name the span that is chosen. */
+  name() {
+    /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
   }
 }

@@ -1,134 +1,140 @@
-// Recordings: a file, its channels, what was found in it, corrected and learned.
-import { get, post } from "../parts/api.js";
-import { learnSpans } from "../parts/changes.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
+// Recordings: a file, its channels, what was found in it, corrected, played, saved and learned.
+import { download, get, post } from "../parts/api.js";
+import { learnSpans, undo } from "../parts/changes.js";
+import { byId, counted, fill, make, offer } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
+import { isRedo, isUndo } from "../parts/shortcuts.js";
 import { tried } from "../parts/toasts.js";
+import { currentView } from "../parts/views.js";
 import { startDropping } from "./dropping.js";
 import { Episodes } from "./episodes.js";
 import { columnCount, fitting, mismatch } from "./fitting.js";
+import { askHow } from "./importing.js";
 import { Player } from "./player.js";
-import { markRow, showSpans } from "./spans.js";
+import { ShapeView } from "./shapes.js";
+import { markRow, plain, showSpans } from "./spans.js";
 import { Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
+const RESTS = 100; // stretches of a recording of which shapes are drawn where there is no annotation
 const ASKED = 400; // how often it is asked how much is searched [ms]
 
-/** What an episode is called above its signals. @param {any} episode */
-const nameOf = ({ number, task, place }) => `Episode ${number}: ${task ?? place}`;
-
+/** @typedef {{name: string, kind: string, unit: string|null, columns: string[]}} Channel */
+/** @typedef {{name: string, channels: Channel[], duration: number, rate: number|null, label: string|null}} Table */
 /**
- * Names of the channels that are chosen at first: of an episode those of the library, or of its first feature.
- * @param {any} recording @param {any} table @returns {Set<string>}
+ * What the server says of a recording.
+ * @typedef {{recording: string, tables: Table[], plots: any[], problems: string[], preview: any, command: string,
+ *   episode?: any, videos?: any[], chosen?: string[]}} Recording
  */
-const chosenOf = ({ chosen }, { channels }) => {
-  const named = (/** @type {string[]} */ names) =>
-    channels.filter((/** @type {any} */ channel) => names.includes(channel.name));
-  const ours = (library().channels ?? []).map((/** @type {any} */ channel) => channel.name);
-  const own = !chosen ? channels : ours.length && named(ours).length === ours.length ? named(ours) : named(chosen);
-  const fits = !library().symbols.length || !mismatch(own, library());
-  return fitting(chosen && fits ? own : channels, library());
-};
 
 class Recordings {
   constructor() {
+    /** @type {Recording|null} */
     this.read = null;
     /** @type {AbortController|null} Of the search that is under way. */
     this.search = null;
-    this.page = {
-      choose: (/** @type {number} */ k) => this.choose(k),
-      changed: () => this.corrected(),
-      seek: (/** @type {number} */ time) => this.player.seek(time),
-      key: (/** @type {KeyboardEvent} */ event) => this.player.key(event),
-    };
-    this.timeline = new Timeline(this.page);
-    this.player = new Player((time) => this.timeline.goTo(time));
+    /** @type {string[]} The spans after each change, the first ones as they were shown. */
+    this.states = [];
+    this.state = 0; // which of them is shown
+    /** @type {any[]} Spans, and what lies between. */
+    this.stretches = [];
+    this.timeline = new Timeline(this);
+    this.shape = new ShapeView();
+    this.player = new Player((time) => this.goTo(time));
     this.episodes = new Episodes({
-      open: (detail) => this.open(detail, nameOf(detail.episode)),
-      channels: (detail) => [...chosenOf(detail, detail.tables[0])],
+      open: (detail) =>
+        this.open(detail, `Episode ${detail.episode.number}: ${detail.episode.task ?? detail.episode.place}`),
+      channels: ({ tables, chosen }) => [...fitting(tables[0].channels, library(), chosen)],
       spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
     });
-    startDropping((recording, name) => this.open(recording, name));
-    byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
-    byId("add-span").addEventListener("click", () => this.add());
-    byId("learn-spans").addEventListener("click", () => this.learn());
-    byId("learn-file").addEventListener("click", () =>
-      learnSpans(this.read.recording, { channels: this.chosenChannels() }),
+    startDropping(
+      (recording, name) => this.open(recording, name),
+      (file) => Boolean(this.read) && this.player.add(file),
     );
-    for (const [id, factor] of /** @type {[string, number][]} */ ([
-      ["zoom-in", 0.6],
-      ["zoom-out", 1 / 0.6],
-    ]))
-      byId(id).addEventListener("click", () => this.timeline.zoom(factor));
-    byId("tables").addEventListener("change", () => this.table());
+    for (const [id, act] of Object.entries({
+      spot: () => (this.search ? this.search.abort() : this.spot()),
+      "add-span": () => this.add(),
+      "undo-span": () => this.step(-1),
+      "redo-span": () => this.step(1),
+      "save-spans": () => tried(() => this.save()),
+      "learn-spans": () => this.learn(),
+      "learn-file": () => learnSpans(this.read.recording, { channels: this.chosenChannels() }),
+      "read-as": () => this.readAs(),
+      "zoom-in": () => this.timeline.zoom(0.6),
+      "zoom-out": () => this.timeline.zoom(1 / 0.6),
+    }))
+      byId(id).addEventListener("click", act);
+    byId("tables").addEventListener("change", () => this.showTable());
     byId("channels").addEventListener("change", () => this.columns());
+    document.addEventListener("keydown", (event) => this.takeBack(event));
     onLibrary(() => {
       this.allow();
       this.timeline.board.draw();
     });
   }
 
-  /** @param {any} recording @param {string} name */
+  /** @param {Recording} recording @param {string} name */
   open(recording, name) {
+    const { tables, episode } = recording;
     this.read = recording;
+    recording.videos ??= [];
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
     byId("recording-name").textContent = name;
-    fill(
+    byId("read-as").hidden = !recording.preview;
+    byId("shell").textContent = recording.command;
+    offer(
       byId("tables"),
-      ...recording.tables.map((/** @type {any} */ table, /** @type {number} */ k) =>
-        make("option", { value: String(k) }, table.name),
-      ),
+      tables.map((table) => table.name),
     );
-    byId("tables-part").hidden = recording.tables.length < 2;
-    const labeled = recording.tables.filter((/** @type {any} */ table) => table.label !== null);
-    const labels = [...new Set(labeled.map((/** @type {any} */ table) => table.label))].slice(0, 8).join(", ");
-    byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
-    byId("learn-file").title =
-      `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${labels}`;
-    fill(
-      byId("problems"),
-      ...recording.problems.map((/** @type {string} */ problem) => make("p", { class: "small" }, problem)),
-    );
-    this.table();
-    byId(recording.episode ? "timeline-canvas" : "spot").focus({ preventScroll: true });
-    if (recording.episode) byId("recording").scrollIntoView({ block: "start" });
+    byId("tables-part").hidden = tables.length < 2;
+    const labeled = tables.filter((table) => table.label !== null);
+    const labels = [...new Set(labeled.map((table) => table.label))].slice(0, 8).join(", ");
+    byId("learn-file").hidden = tables.length < 2 || !labeled.length;
+    byId("learn-file").title = `${counted(tables.length, "movement")}, ${labeled.length} with a label: ${labels}`;
+    fill(byId("problems"), ...recording.problems.map((problem) => make("p", { class: "small" }, problem)));
+    this.showTable();
+    byId(episode ? "timeline-canvas" : "spot").focus({ preventScroll: true });
+    if (episode) byId("recording").scrollIntoView({ block: "start" });
+  }
+
+  /** Ask how the file is read. */
+  async readAs() {
+    const name = byId("recording-name").textContent;
+    const recording = await askHow({ ...this.read, unclear: "" }, name);
+    if (recording) this.open(recording, name);
+  }
+
+  /** The table that is chosen. */
+  get table() {
+    return this.read.tables[Number(byId("tables").value)];
   }
 
   /** Another table, of this file or of a new one: what is still searched for is about the one before. */
-  table() {
+  showTable() {
     this.search?.abort();
     this.over("");
-    const k = Number(byId("tables").value);
-    const table = this.read.tables[k];
+    const { table } = this;
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
     byId("recording-facts").textContent =
       `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
-    const chosen = chosenOf(this.read, table);
-    const box = (/** @type {any} */ channel, /** @type {number} */ k) => {
+    const chosen = fitting(table.channels, library(), this.read.chosen);
+    const boxes = table.channels.map(({ name, kind, unit }, k) => {
       const key = make("span", { class: "key" });
       key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
-      return make(
-        "label",
-        { class: "check" },
-        make("input", { type: "checkbox", checked: chosen.has(channel.name), value: channel.name }),
-        key,
-        make(
-          "span",
-          {},
-          channel.name,
-          make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", ")),
-        ),
-      );
-    };
-    fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
-    this.timeline.spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
-    if (this.read.episode) this.timeline.spans = this.read.episode.spans;
-    this.columns();
+      const says = make("span", { class: "soft small says" }, [kind, unit].filter(Boolean).join(", "));
+      const box = make("input", { type: "checkbox", checked: chosen.has(name), value: name });
+      return make("label", { class: "check" }, box, key, make("span", {}, name, says));
+    });
+    fill(byId("channels"), make("legend", {}, "Channels"), ...boxes);
+    const spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
+    this.timeline.spans = this.read.episode?.spans ?? spans;
+    this.states = [];
     this.timeline.show(this.shownPlot());
-    this.player.open(table.duration, this.read.videos ?? []);
-    this.changed();
+    this.player.open(table.duration, this.read.videos);
+    this.columns();
+    this.show();
   }
 
   chosenChannels() {
@@ -139,28 +145,47 @@ class Recordings {
 
   /** The plot with the columns of the chosen channels. */
   shownPlot() {
-    const k = Number(byId("tables").value);
-    const plot = this.read.plots[k];
     const names = new Set(this.chosenChannels());
-    const wanted = new Set(
-      this.read.tables[k].channels
-        .filter((/** @type {any} */ channel) => names.has(channel.name))
-        .flatMap((/** @type {any} */ channel) => channel.columns ?? [channel.name]),
-    );
-    const columns = plot.columns
-      .map((/** @type {any} */ column, /** @type {number} */ at) => ({ ...column, color: COLORS[at % COLORS.length] }))
-      .filter((/** @type {any} */ column) => wanted.has(column.name) || names.has(column.name));
-    return { ...plot, columns };
+    const plot = this.read.plots[this.read.tables.indexOf(this.table)];
+    for (const { name, columns } of this.table.channels) if (names.has(name)) for (const own of columns) names.add(own);
+    /** @type {any[]} */
+    const columns = plot.columns;
+    const colored = columns.map((column, at) => ({ ...column, color: COLORS[at % COLORS.length] }));
+    return { ...plot, columns: colored.filter(({ name }) => names.has(name)) };
   }
 
   columns() {
     this.timeline.plot = this.shownPlot();
     this.timeline.board.draw();
     this.allow();
+    this.draw();
+  }
+
+  /** Ask for the shapes of all spans, and of what lies between. */
+  async draw() {
+    const { spans, shapes, extent } = this.timeline;
+    const long = Math.max(SHORT, extent[1] / RESTS);
+    const rests = Array.from({ length: Math.ceil(extent[1] / long) }, (_, k) => ({
+      begin: k * long,
+      end: k * long + long,
+    }));
+    const stretches = [...spans, ...rests];
+    this.stretches = stretches;
+    const asked = { ...this.body(), spans: stretches.map(({ begin, end }) => ({ begin, end })), points: 100 };
+    /** @type {any[]} */
+    const answer = await post(this.path("shapes"), asked).catch(() => []);
+    for (const [k, shape] of answer.entries()) shapes.set(stretches[k], shape);
+    this.timeline.board.draw();
+    this.goTo(this.player.at);
+  }
+
+  /** The address of what is asked about the recording. @param {string} what */
+  path(what) {
+    return `/api/recordings/${encodeURIComponent(this.read.recording)}/${what}`;
   }
 
   body() {
-    return { table: this.read.tables[Number(byId("tables").value)].name, channels: this.chosenChannels() };
+    return { table: this.table.name, channels: this.chosenChannels() };
   }
 
   async spot() {
@@ -171,7 +196,7 @@ class Recordings {
       yes: "Look again",
     };
     if (episode?.corrected && !(await ask(question))) return;
-    const path = `/api/recordings/${encodeURIComponent(recording)}/spotted`;
+    const path = this.path("spotted");
     const search = new AbortController();
     this.search = search;
     this.allow();
@@ -187,18 +212,68 @@ class Recordings {
 
   /** Show what was found. @param {any[]} spans */
   spotted(spans) {
-    this.timeline.spans = spans;
-    if (this.read.episode) Object.assign(this.read.episode, { spans, corrected: false });
-    this.choose(-1);
-    this.changed();
+    this.take(spans);
+    if (this.read.episode) this.read.episode.corrected = false;
     const named = spans.filter((span) => span.label !== null).length;
     const advice = spans.length ? " Choose one to drag its edges." : "";
     byId("spans-state").textContent = `${counted(named, "known movement")}, ${spans.length - named} unknown.${advice}`;
   }
 
-  /** A person has changed what an episode shows: it is kept. */
-  corrected() {
+  /** Show other spans. @param {any[]} spans */
+  take(spans) {
+    this.timeline.spans = spans;
+    if (this.read.episode) this.read.episode.spans = spans;
+    this.choose(-1);
+    this.show();
+    this.draw();
+  }
+
+  /** Take back a change, or make it again. @param {number} by */
+  step(by) {
+    if (!this.states[this.state + by]) return;
+    this.state += by;
+    this.take(JSON.parse(this.states[this.state]));
+    this.keep();
+  }
+
+  /** Ctrl-Z is for the spans; without any change of these, for the library. @param {KeyboardEvent} event */
+  takeBack(event) {
+    if (currentView() !== "recordings" || event.defaultPrevented) return;
+    if (isUndo(event)) this.state ? this.step(-1) : undo();
+    else if (isRedo(event)) this.step(1);
+    else return;
+    event.preventDefault();
+  }
+
+  /** The playhead is elsewhere. @param {number} time */
+  goTo(time) {
+    this.timeline.goTo(time);
+    const stretch = this.stretches.find(({ begin, end }) => begin <= time && time <= end);
+    if (stretch) this.shape.show(time, stretch, this.timeline.shapes.get(stretch));
+  }
+
+  /** The spans as a file, in a format of the shell. */
+  save() {
+    const asked = { ...this.body(), spans: plain(this.timeline.spans), format: byId("save-format").value };
+    return download(this.path("annotations"), asked, "annotations");
+  }
+
+  /** @param {number} k */
+  remove(k) {
+    this.timeline.spans.splice(k, 1);
+    this.choose(-1);
     this.changed();
+  }
+
+  /** A person has changed what is shown. */
+  changed() {
+    this.show();
+    this.draw();
+    this.keep();
+  }
+
+  /** What an episode shows is kept by the server. */
+  keep() {
     if (!this.read?.episode) return;
     this.read.episode.corrected = true;
     this.episodes.put(this.read.recording, this.timeline.spans, true);
@@ -218,14 +293,18 @@ class Recordings {
     byId("spans-state").textContent = text;
   }
 
-  /** A span in the middle of what is shown; the first one of a short recording is all of it. */
+  /** A span at the playhead, or in the middle of what is shown; the first one of a short recording is all of it. */
   add() {
-    const [from, to] = this.timeline.range;
-    const aside = !this.timeline.spans.length && to - from < SHORT ? 0 : 0.4 * (to - from);
-    this.timeline.spans.push({ begin: from + aside, end: to - aside, label: null, p: null });
-    this.corrected();
-    this.choose(this.timeline.spans.length - 1);
-    /** @type {HTMLElement} */ (byId("spans").querySelector("tr:last-child input[type=text]")).focus();
+    if (!this.read || library().read_only) return;
+    const { range, spans, head, extent } = this.timeline;
+    const [from, to] = range;
+    const middle = from < head && head < to ? head : (from + to) / 2;
+    const half = (to - from) * (spans.length || to - from >= SHORT ? 0.1 : 1);
+    const [begin, end] = [Math.max(middle - half, extent[0]), Math.min(middle + half, extent[1])];
+    spans.push({ begin, end, label: null, p: null });
+    this.changed();
+    this.choose(spans.length - 1);
+    this.timeline.name();
   }
 
   /** @param {number} k -1 for none. */
@@ -236,32 +315,51 @@ class Recordings {
     markRow(k);
   }
 
-  changed() {
-    showSpans(this.timeline.spans, this.timeline.chosen, this.page);
-    this.timeline.board.draw();
+  /** @param {number} time */
+  seek(time) {
+    this.player.seek(time);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    this.player.key(event);
+  }
+
+  show() {
+    const { spans, chosen, board } = this.timeline;
+    const now = JSON.stringify(spans);
+    if (!this.states.length) this.state = -1; // of another table
+    if (this.states[this.state] !== now) this.states.splice(++this.state, Infinity, now);
+    showSpans(spans, chosen, this);
+    board.draw();
     this.allow();
   }
 
   allow() {
     if (!this.read) return;
-    const table = this.read.tables[Number(byId("tables").value)];
+    const { spans } = this.timeline;
     const names = new Set(this.chosenChannels());
+    const { read_only, symbols } = library();
     const wrong = mismatch(
-      table.channels.filter((/** @type {any} */ channel) => names.has(channel.name)),
+      this.table.channels.filter(({ name }) => names.has(name)),
       library(),
     );
     byId("channels-note").textContent = wrong;
+    byId("undo-span").disabled = !this.state;
+    byId("redo-span").disabled = this.state >= this.states.length - 1;
+    byId("save-part").hidden = !spans.length;
     byId("spot").textContent = this.search ? "Cancel" : "Find movements";
     byId("spot").disabled = wrong !== "" && !this.search;
-    byId("learn-file").disabled = library().read_only || !names.size || (wrong !== "" && library().symbols.length > 0);
-    byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((span) => span.label !== null);
+    byId("learn-file").disabled = read_only || !names.size || (wrong !== "" && symbols.length > 0);
+    byId("learn-spans").disabled = read_only || !spans.some((span) => span.label !== null);
   }
 
   async learn() {
-    const spans = this.timeline.spans
-      .filter((span) => span.label !== null)
-      .map(({ begin, end, label }) => ({ begin, end, label }));
-    await learnSpans(this.read.recording, { ...this.body(), spans });
+    const spans = this.timeline.spans.filter((span) => span.label !== null);
+    await learnSpans(this.read.recording, {
+      ...this.body(),
+      spans: spans.map(({ begin, end, label }) => ({ begin, end, label })),
+    });
   }
 }
 

@@ -1,65 +1,47 @@
-// Inside the frame: what the studio sends becomes the data of the viewer and a chart of each joint, and the
-// viewer starts.
-import { byId, make } from "../parts/elements.js";
-import { svg } from "../parts/svg.js";
+// Inside the frame: the viewer shows what the studio sends, and where the start or the goal was dragged to goes back.
+import { byId, fill, make } from "../parts/elements.js";
+import { svg } from "../parts/thumbnails.js";
 
-const [WIDTH, HEIGHT] = [300, 80];
-
-/**
- * @param {any} scene
- * @param {{name: string, low: number|null, high: number|null}} joint
- * @param {number} k Its column.
- */
-function chart(scene, joint, k) {
-  const values = scene.positions.map((/** @type {number[]} */ row) => row[k]);
-  const limits = [joint.low, joint.high].filter((limit) => Number.isFinite(limit));
-  const low = Math.min(...values, ...limits);
-  const high = Math.max(...values, ...limits);
-  const room = 0.08 * (high - low || 1);
-  const end = scene.times[scene.times.length - 1] || 1;
-  const x = (/** @type {number} */ time) => (WIDTH * time) / end;
-  const y = (/** @type {number} */ value) => HEIGHT * (1 - (value - low + room) / (high - low + 2 * room));
-  const level = (/** @type {number} */ value) =>
-    svg("line", { class: "limit", x1: 0, x2: WIDTH, y1: y(value), y2: y(value) });
-  const path = values
-    .map(
-      (/** @type {number} */ value, /** @type {number} */ i) =>
-        `${x(scene.times[i]).toFixed(1)} ${y(value).toFixed(1)}`,
-    )
-    .join("L");
+/** A joint over time between its limits. @param {any} scene @param {any} joint @param {number} k */
+function chart({ times, positions, begins }, { name, low, high }, k) {
+  const values = positions.map((/** @type {number[]} */ row) => row[k]);
+  const limits = [low, high].filter(Number.isFinite);
+  const least = Math.min(...values, ...limits);
+  const room = Math.max(...values, ...limits) - least || 1;
+  const x = (/** @type {number} */ time) => (300 * time) / (times[times.length - 1] || 1);
+  const y = (/** @type {number} */ value) => 75 - (70 * (value - least)) / room;
+  const place = (/** @type {number} */ value, /** @type {number} */ i) => `${x(times[i])} ${y(value)}`;
   const picture = svg(
     "svg",
-    { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", "aria-hidden": "true" },
-    svg("rect", { class: "approach", x: 0, y: 0, width: x(scene.begins), height: HEIGHT }),
-    ...limits.map(level),
-    svg("path", { class: "joint", d: `M${path}` }),
-    svg("line", { class: "cursor", x1: 0, x2: 0, y1: 0, y2: HEIGHT }),
+    { viewBox: "0 0 300 80", preserveAspectRatio: "none", "aria-hidden": "true" },
+    svg("rect", { class: "approach", width: x(begins), height: 80 }),
+    ...limits.map((limit) => svg("line", { class: "limit", x2: 300, y1: y(limit), y2: y(limit) })),
+    svg("path", { class: "joint", d: `M${values.map(place).join("L")}` }),
+    svg("line", { class: "cursor", y2: 80 }),
   );
+  const title = make("span", { class: "name", title: name }, name);
   return make(
     "figure",
     { class: "chart" },
-    make(
-      "figcaption",
-      {},
-      make("span", { class: "name", title: joint.name }, joint.name),
-      make("output", { "data-unit": "rad" }),
-    ),
+    make("figcaption", {}, title, make("output", { "data-unit": "rad" })),
     picture,
   );
 }
 
-window.addEventListener("message", (event) => {
-  if (event.origin !== location.origin || event.source !== parent || !event.data?.scene || byId("data")) return;
-  const { scene, joints } = event.data;
-  document.body.append(make("script", { type: "application/json", id: "data" }, JSON.stringify(scene)));
-  byId("charts").append(
-    ...scene.joints.map((/** @type {string} */ name, /** @type {number} */ k) =>
-      chart(scene, joints?.[k] ?? { name, low: null, high: null }, k),
-    ),
-  );
-  const viewer = make("script", { src: "/vendor/viewer.js" });
-  if (!matchMedia("(prefers-reduced-motion: reduce)").matches)
-    viewer.addEventListener("load", () => byId("play").click());
-  document.body.append(viewer);
+const viewer = /** @type {any} */ (window).kineme;
+const { classList } = document.body;
+classList.toggle("mini", location.search === "?mini");
+if (location.search !== "?mini")
+  viewer.moved = (/** @type {string} */ end, /** @type {number[]} */ point) =>
+    parent.postMessage({ end, point }, location.origin);
+
+window.addEventListener("message", ({ origin, source, data: { scene, joints, posture } }) => {
+  if (origin !== location.origin || source !== parent) return;
+  if (posture) viewer.pose(posture);
+  if (!scene) return;
+  fill(byId("charts"), ...joints.map((/** @type {any} */ joint, /** @type {number} */ k) => chart(scene, joint, k)));
+  viewer.load(scene);
+  classList.toggle("rests", scene.times.length < 2);
+  if (scene.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches) viewer.play();
 });
 parent.postMessage("ready", location.origin);

@@ -1,0 +1,19 @@
+// The frame in which an arm is drawn: the scene of three.js and its ids stay in there.
+import { fill, make } from "./elements.js";
+
+/**
+ * @param {HTMLElement} host
+ * @param {string} address
+ * @param {(message: any) => void} hear Where the start or the goal was dragged to.
+ * @returns {Promise<(message: Object) => void>} Tells the frame what to show, once it listens.
+ */
+export const openArm = (host, address, hear) =>
+  new Promise((done) => {
+    const frame = make("iframe", { src: address, title: "The arm", class: "arm-frame" });
+    window.addEventListener("message", ({ source, data }) => {
+      if (source !== frame.contentWindow) return;
+      if (data === "ready") done((message) => frame.contentWindow.postMessage(message, location.origin));
+      else hear(data);
+    });
+    fill(host, frame);
+  });

@@ -1,0 +1,247 @@
+"""The first minute in Chromium: a stranger draws, names and is recognized; answers speak one language; why."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from browser_samples import UNANSWERED, draw, letters, settle, show, wait_for_text
+from studio_samples import Served
+
+import kineme
+from browsing import Pages, wait_until
+from kineme.datasets import EXAMPLES, load_example
+from kineme.studio.page.write_page import write_page
+
+VIEWS = ("draw", "library", "recordings", "robot")
+MOST = 20  # enabled controls on a first screen
+WORDS = ("Sure", "Probably", "Looks like", "New")
+ANSWERED = f"{list(WORDS)}.includes(document.getElementById('verdict-kind').textContent)"
+
+#: What can be used without scrolling, by id or text.
+CONTROLS = """() => [...document.querySelectorAll("button, input, select, textarea, summary, a[href], [tabindex='0']")]
+  .filter((node) => !node.matches(":disabled") && node.checkVisibility({ visibilityProperty: true }))
+  .filter((node) => {
+    const box = node.getBoundingClientRect();
+    return box.width > 0 && box.bottom > 0 && box.top < innerHeight && box.right > 0 && box.left < innerWidth;
+  })
+  .map((node) => node.id || node.textContent.trim() || node.getAttribute("aria-label"))"""
+
+PAINTED = """(id) => {
+  const canvas = document.getElementById(id);
+  return canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0);
+}"""
+
+
+def strokes(name):
+    """A letter as another hand writes it: arcs and lines, none of LASA's."""
+
+    def arc(x, y, a, b, n=24):
+        t = np.radians(np.linspace(a, b, n))
+        return np.column_stack((x * np.cos(t), y * np.sin(t)))
+
+    points = {
+        "C": arc(0.8, 1.0, 45, 315),
+        "G": np.concatenate((arc(0.8, 1.0, 45, 340), [[0.7, 0.0], [0.2, 0.0]])),
+        "L": np.array([[0.0, 1.0], [0.0, -1.0], [0.9, -1.0]]),
+        "S": np.concatenate((arc(0.6, 0.5, 30, 265) - [0, -0.5], arc(0.6, 0.5, 85, -150) - [0, 0.5])),
+        "Z": np.array([[-0.7, 1.0], [0.7, 1.0], [-0.7, -1.0], [0.7, -1.0]]),
+    }[name]
+    lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    even = np.linspace(0.0, lengths[-1], 80)
+    path = np.column_stack([np.interp(even, lengths, column) for column in points.T])
+    return kineme.Trajectory(np.linspace(0.0, 1.4, 80), path)
+
+
+@pytest.fixture(scope="module")
+def tabs(browser):
+    tabs = Pages(browser, script=UNANSWERED)
+    yield tabs
+    tabs.close()
+
+
+@pytest.fixture
+def opened(tabs):
+    """A function that opens a studio of a folder; at the end nothing went wrong."""
+    studios = []
+
+    def open_page(folder, **options):
+        studios.append(Served(folder))
+        page = tabs.new(**options)
+        page.goto(f"{studios[-1].address}/?token={studios[-1].token}")
+        wait_until(page, "document.getElementById('status').dataset.state === 'here'")
+        settle(page)
+        return page
+
+    yield open_page
+    tabs.leave(*(studio.address for studio in studios), "file:", "blob:")
+    for studio in studios:
+        studio.end()
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    """A library of each example, and its page."""
+    folder = tmp_path_factory.mktemp("examples")
+    for name in EXAMPLES:
+        with kineme.ActionLibrary(folder / name, create=True) as library:
+            library.learn(load_example(name))
+            if library.n_dims == 2:
+                write_page(folder / f"{name}.html", library)
+    return folder
+
+
+def draw_by_finger(page, movement, on):
+    """Draw with a finger in the middle of a canvas, all of it in a second and a half."""
+    box = page.locator(on).bounding_box()
+    size = 0.6 * min(box["width"], box["height"]) / np.ptp(movement.positions, axis=0).max()
+    away = (movement.positions - movement.positions.min(axis=0) - np.ptp(movement.positions, axis=0) / 2) * [
+        size,
+        -size,
+    ]
+    points = away + np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+    touch, now = page.context.new_cdp_session(page), time.time() - 1.5  # a tap that seems to come before is no tap
+    for k in np.linspace(0, len(points) - 1, 50).astype(int):
+        event = {"type": "touchMove" if k else "touchStart", "timestamp": now + 1.5 * k / len(points)}
+        touch.send("Input.dispatchTouchEvent", {**event, "touchPoints": [{"x": points[k, 0], "y": points[k, 1]}]})
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    touch.detach()
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_a_stranger_is_recognized_after_five_actions(opened, tmp_path, narrow):
+    phone = {"width": 390, "height": 844, "has_touch": True, "is_mobile": True, "kind": "phone"}
+    page = opened(tmp_path / "new", **(phone if narrow else {}))
+    seen = page.inner_text("main")
+    assert [word in seen for word in ("Draw it again", "try an example", "Send samples", "p-value")] == [1, 1, 0, 0]
+    assert page.is_hidden("#ranks")
+    assert page.is_hidden("#naming")
+    hand = (lambda movement: draw_by_finger(page, movement, "#draw-canvas")) if narrow else lambda m: draw(page, m)
+    began = time.monotonic()
+    hand(strokes("S"))  # 1
+    wait_until(page, "!document.getElementById('naming-name').disabled")
+    if narrow:
+        page.tap("#naming-name")  # 2
+    wait_until(page, "document.activeElement.id === 'naming-name'", seconds=20)  # with a mouse it is there already
+    page.keyboard.type("my own")  # 3
+    page.keyboard.press("Enter")  # 4
+    wait_for_text(page, "#verdict-kind", "Learned")
+    hand(strokes("S"))  # 5
+    wait_until(page, ANSWERED)
+    assert time.monotonic() - began < 30
+    assert (page.inner_text("#verdict-kind"), page.inner_text("#verdict")) == ("Looks like", "my own")
+    assert page.evaluate(PAINTED, "nearest")
+
+
+def test_an_example_is_learned_and_another_hand_is_told_what_its_letters_look_like(opened, tmp_path):
+    page = opened(tmp_path / "new")
+    page.click("text=Letters")
+    wait_until(page, "document.querySelectorAll('#known-symbols li').length === 10")
+    assert page.is_hidden("#draw-examples")
+    for name in "CGLSZ":
+        draw(page, strokes(name))
+        wait_until(page, ANSWERED)
+        assert (page.inner_text("#verdict-kind"), page.inner_text("#verdict")) == ("Looks like", name)
+    page.click("#undo")
+    wait_until(page, "document.getElementById('library-count').textContent.startsWith('0 symbols')")
+
+
+def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples, tmp_path):
+    with kineme.ActionLibrary(tmp_path / "own", create=True) as library:
+        library.learn(load_example("letters"))
+    page = opened(tmp_path / "own")
+    draw(page, strokes("G"))
+    wait_until(page, ANSWERED)
+    page.click("#why summary")
+    wait_until(page, "!document.getElementById('why-pictures').hidden")
+    page.click("text=Yes, it is G")
+    wait_for_text(page, "#verdict-kind", "Learned")
+    captions = page.locator("#why-pictures figcaption").all_text_contents()
+    with kineme.ActionLibrary(tmp_path / "own") as library:
+        drawn = library.movements("G")[-1]
+        assert len(library["G"].members) == 8
+        library.undo()
+        explained = library.recognize(drawn).explain()
+    assert [caption.split(";")[0] for caption in captions] == [
+        f"{role}: {overlay.label}, {overlay.similarity:.2f} alike"
+        for role, overlay in (("Nearest", explained.nearest), ("Next", explained.runner_up))
+    ]
+    assert f"{100 * explained.nearest.differences.max():.0f} % of its size" in captions[0]
+
+
+def test_the_page_explains_as_python_does(opened, tabs, examples):
+    page = tabs.new(kind="page")
+    page.goto((examples / "letters.html").as_uri())
+    wait_until(page, "window.kineme !== undefined")
+    assert page.is_hidden("#ranks")
+    for name in "GSZ":
+        page.keyboard.press("Escape")
+        draw(page, strokes(name), on="#stage")
+        wait_until(page, "!document.getElementById('why-pictures').hidden")
+        assert page.evaluate(PAINTED, "nearest")
+        times, positions = page.evaluate("[kineme.state.drawn.times, kineme.state.drawn.positions]")
+        captions = page.locator("#why-pictures figcaption").all_text_contents()
+        with kineme.ActionLibrary(examples / "letters", read_only=True) as library:
+            explained = library.recognize(kineme.Trajectory(np.array(times), np.array(positions))).explain()
+        for caption, overlay in zip(captions, (explained.nearest, explained.runner_up), strict=True):
+            assert f": {overlay.label}, {overlay.similarity:.2f} alike" in caption
+            shown = int(caption.split("up to ")[1].split(" %")[0]) / 100
+            assert shown == pytest.approx(overlay.differences.max(), abs=0.04)  # its paths are smoothed more
+
+
+def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, tabs, examples):
+    page = tabs.new(width=390, height=844, has_touch=True, is_mobile=True, kind="phone page")
+    page.goto((examples / "letters.html").as_uri())
+    wait_until(page, "window.kineme !== undefined")
+    for name in "GC":  # both begin where the first one does
+        draw_by_finger(page, strokes(name), "#stage")
+        wait_until(page, "name => kineme.state.answer?.ranked[0].label === name", name)
+        assert page.evaluate("kineme.state.stroke") is None
+    before = page.evaluate("kineme.state.moving.goal")
+    page.tap("#drag")
+    wait_until(page, "kineme.state.drags", seconds=20)
+    path = page.evaluate("kineme.state.moving.positions.map((x) => kineme.stage.project(x))")
+    box = page.locator("#stage").bounding_box()
+    (x, y), left, top = path[-1], box["x"], box["y"]
+    touch = page.context.new_cdp_session(page)
+    for kind, at in (("touchStart", 0), ("touchMove", 30), ("touchMove", 60)):
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": left + x + at, "y": top + y}]})
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    assert page.evaluate("kineme.state.moving.goal") != before
+    assert page.evaluate("kineme.state.answer.ranked[0].label") == "C"
+
+
+@pytest.mark.parametrize("width", [390, 820, 1440])
+def test_a_first_screen_has_few_controls(opened, tabs, examples, tmp_path, width):
+    many = {}
+    for name, folder in (("new", tmp_path / "new"), *((name, examples / name) for name in EXAMPLES)):
+        page = opened(folder, width=width)
+        for view in VIEWS:
+            show(page, view)
+            many[name, view] = page.evaluate(CONTROLS)
+        if name == "letters":
+            show(page, "draw")
+            draw(page, letters("GShape")[0])
+            wait_until(page, ANSWERED)
+            many[name, "answered"] = page.evaluate(CONTROLS)
+    page = tabs.new(width=width, height=900, kind="page")
+    page.goto((examples / "letters.html").as_uri())
+    wait_until(page, "window.kineme !== undefined")
+    many["letters", "page"] = page.evaluate(CONTROLS)
+    assert {key: controls for key, controls in many.items() if len(controls) > MOST} == {}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_told_apart_and_do_not_change(name):
+    demos, again = load_example(name), load_example(name)
+    np.testing.assert_array_equal(demos.positions, again.positions)
+    held = np.arange(len(demos)) % (7 if name == "letters" else 5) > 2
+    recognizer = kineme.Recognizer().fit(demos[~held])
+    answers = recognizer.recognize(demos[held])
+    assert np.mean([answer.label == label for answer, label in zip(answers, demos[held].labels, strict=True)]) >= 0.9
+
+
+def test_other_examples_are_refused():
+    with pytest.raises(kineme.errors.SpecificationError, match="letters"):
+        load_example("dances")
