@@ -321,7 +321,9 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-READING = {f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING = {
+    f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "robots/move", "recordings", "wand")
+}
 READING |= {f"/recordings/{{key}}/{act}" for act in ("spotted", "read", "shapes", "annotations")} | {
     "/episodes/{key}/spans"
 }
