@@ -214,10 +214,10 @@ def arm() -> Figure:
 
 
 def simulated_panda() -> Figure:
-    """The simulation of docs/guide/robots.md: the path of the tip, and how far it is off."""
+    """The simulation of docs/guide/robots-live.md: the path of the tip, and how far it is off."""
     names: dict[str, Any] = {}
     with TemporaryDirectory() as place:
-        for _ in walk(DOCS / "guide" / "robots.md", Path(place), names):
+        for _ in walk(DOCS / "guide" / "robots-live.md", Path(place), names):
             pass
     goals, wanted, tips = (names[name] for name in ("goals", "wanted", "tips"))
     figure = new_figure(9.6, 3.6)

@@ -21,7 +21,7 @@ from guide_figures import (
     via_points,
 )
 from million_figure import million
-from moving_picture import moving_picture
+from moving_picture import moving_goal, moving_picture
 from PIL import Image
 from tutorial_figures import gestures, place
 from walk_through import walk
@@ -33,7 +33,9 @@ _COLORS = 128  # of a picture of a tutorial
 DRAWING = {
     "start/first-success": "first",
     "tutorials/action-library": "library",
+    "tutorials/action-library-without-labels": "library",
     "tutorials/unlabeled-to-a-planner": "planner",
+    "tutorials/symbols-to-a-plan": "planner",
     "tutorials/a-plan-that-recovers": "plan",
 }
 FIGURES = {
@@ -78,6 +80,7 @@ def main(folder: Path) -> None:
     for name, draw in FIGURES.items():
         (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
     (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
+    (folder / "moving-goal.svg").write_text(moving_goal(), encoding="utf-8")
     for name in SCRIPTS:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
     for walked, prefix in DRAWING.items():

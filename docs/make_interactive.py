@@ -1,22 +1,37 @@
-"""Write the interactive figure of the concepts: its two matrices, its style and its script, as one piece of HTML.
+"""Write what can be used within the pages: the interactive figure of the concepts, and the page to draw in.
 
-The build of the site writes ``docs/concepts/interactive/primitive.html``, which the page includes.
+The figure is one piece of HTML: its two matrices, its style and its script. The build of the site writes it as
+``docs/concepts/interactive/primitive.html``, which the page includes. The page to draw in is one that `kineme page`
+writes, of some letters; the build adds it to the site, and the first page shows it.
 """
 
 from __future__ import annotations
 
 import json
+import re
+from base64 import b64encode
+from hashlib import sha256
+from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 import kineme
 from kineme.dmp.discrete.operators import decoder, encoder
+from kineme.studio.page.write_page import page_of
+from kineme.studio.snapshot import DRAWN, snapshot_of_library
 
 FOLDER = Path(__file__).parent / "concepts" / "interactive"
 N_BASIS, N_POINTS = 10, 81
 FORMULATIONS = ("bio-inspired", "original")
+#: Shapes of LASA that are letters -> these, and how many demonstrations of each the page to draw in holds.
+LETTERS = {
+    "CShape": "C", "GShape": "G", "JShape": "J", "NShape": "N", "PShape": "P", "Sshape": "S",
+    "WShape": "W", "Zshape": "Z",
+}  # fmt: skip
+N_SHOWN = 3
 _CONTROLS = """\
 <div class="controls">
 <label>time <input type="range" min="0" value="0" step="1"></label>
@@ -66,3 +81,30 @@ def write(path: Path = FOLDER / "primitive.html") -> None:
     text = html(matrices())
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
+
+
+def pages_to_draw_in() -> dict[str, str]:
+    """File name -> the page that recognizes and moves `LETTERS`, to stand within another one: no head, foot, options.
+
+    There is one by light and one in the dark: a page within another one cannot know which of them its reader chose.
+    """
+    demos = kineme.load_lasa(list(LETTERS))
+    shown = demos[np.arange(len(demos)) % (len(demos) // len(LETTERS)) < N_SHOWN]
+    with TemporaryDirectory() as folder, kineme.ActionLibrary(Path(folder) / "letters", create=True) as library:
+        library.learn(shown, [LETTERS[label] for label in shown.labels])
+        snapshot = snapshot_of_library(library, None, DRAWN)
+    tokens = (files("kineme.studio") / "web" / "tokens.css").read_text(encoding="utf-8")
+    light, dark = re.findall(r":root \{[^}]*--page:[^}]*\}", tokens)
+    rules = (FOLDER / "draw.css").read_text(encoding="utf-8")
+    page = page_of(snapshot, "Draw a letter")
+    return {
+        f"draw-{scheme}.html": _styled(page, f"{colors}\n:root {{ color-scheme: {scheme}; }}\n{rules}")
+        for scheme, colors in (("light", light), ("dark", dark))
+    }
+
+
+def _styled(page: str, rules: str) -> str:
+    """Add rules to the style of a page, whose policy allows that style by its hash."""
+    style = page.partition("<style>")[2].partition("</style>")[0]
+    before, after = (b64encode(sha256(text.encode()).digest()).decode() for text in (style, style + rules))
+    return page.replace(before, after).replace(f"<style>{style}</style>", f"<style>{style}{rules}</style>")

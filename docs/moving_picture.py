@@ -1,6 +1,7 @@
-"""The moving picture of the first page: a letter is drawn, recognized while it is drawn, and moved to new goals.
+"""Moving pictures: a letter is drawn, recognized and moved; a movement follows its goal around an obstacle.
 
-One SVG file, animated by its style sheet: no script, sharp at every size, still for readers who ask for less motion.
+Each is one SVG file, animated by its style sheet: no script, sharp at every size, by light and in the dark, still for
+readers who ask for less motion.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import kineme
+from kineme.control import ObstacleAvoidance
 from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE
 
 _WIDTH, _HEIGHT, _PANEL = 760, 270, 240
@@ -21,6 +23,12 @@ _DRAWN = 0.4  # share of the time in which the letter is drawn
 _GOALS = 6
 _AFTER = "84%,96%{opacity:.55}99%,100%{opacity:0}"  # the last goal has come
 _STEPS = 20  # answers of the recognizer that are shown
+#: By light and in the dark, where paper is transparent: the picture lies on the page.
+_COLORS = (
+    f":root{{--paper:#fff;--text:#222;--empty:#eee;--soft:{GRAY};--pen:{BLUE};--moved:{GREEN};--tip:{ORANGE}}}"
+    "@media (prefers-color-scheme:dark)"
+    "{:root{--paper:none;--text:#eee;--empty:#333a42;--soft:#9aa4ae;--pen:#56b4e9;--moved:#2fc79a;--tip:#f08a3c}}"
+)
 _LETTER, _OTHERS = "GShape", ("CShape", "Sshape")
 
 
@@ -51,15 +59,15 @@ def moving_picture() -> str:
 _HEAD = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" \
 aria-label="A handwritten G is drawn, recognized on the way, and moved to new goals">
 <style>{{style}}</style>
-<rect width="{_WIDTH}" height="{_HEIGHT}" rx="10" fill="#ffffff"/>"""
+<rect class="paper" width="{_WIDTH}" height="{_HEIGHT}" rx="10"/>"""
 
 
 def _letter(points: np.ndarray) -> Iterator[str]:
     yield f'<path class="pen" pathLength="1" d="{_d(points)}"/>'
-    yield _dot(points[0], GRAY, 5)
+    yield _dot(points[0], "from")
     steps = [f"{_percent(k / _STEPS)}{_at(point)}" for k, point in _along(points)]
     yield f"<style>@keyframes tip{{{''.join(steps)}100%{_at(points[-1])}}}</style>"
-    yield f'<circle class="tip" r="6" fill="{ORANGE}"/>'
+    yield '<circle class="tip" r="6"/>'
 
 
 def _at(point: np.ndarray) -> str:
@@ -88,9 +96,8 @@ def _answers(demos: kineme.Demonstrations, shown: kineme.Trajectory) -> Iterator
         steps = "".join(f"{_percent(k / _STEPS)}{{transform:scaleX({value:.3f})}}" for k, value in enumerate(values))
         yield f"<style>@keyframes bar{row}{{{steps}100%{{transform:scaleX({values[-1]:.3f})}}}}</style>"
         yield f'<text x="295" y="{y + 17}" class="name">{name[0].upper()}</text>'
-        yield f'<rect x="320" y="{y}" width="150" height="22" rx="4" fill="#eeeeee"/>'
-        color = BLUE if row == 0 else GRAY
-        yield f'<rect class="bar bar{row}" x="320" y="{y}" width="150" height="22" rx="4" fill="{color}"/>'
+        yield f'<rect x="320" y="{y}" width="150" height="22" rx="4" class="empty"/>'
+        yield f'<rect class="bar bar{row}" x="320" y="{y}" width="150" height="22" rx="4"/>'
 
 
 def _goals(frame: _Frame, shown: kineme.Trajectory) -> Iterator[str]:
@@ -106,22 +113,81 @@ def _goals(frame: _Frame, shown: kineme.Trajectory) -> Iterator[str]:
         steps = f"0%,{first}%{{opacity:0}}{first + 2}%,{first + 6}%{{opacity:1}}{_AFTER}"
         yield f"<style>@keyframes goal{k}{{{steps}}}</style>"
         yield f'<g style="animation:goal{k} {_TIME}">'
-        yield f'<path class="moved" d="{_d(points)}"/>{_dot(end, GREEN, 5)}</g>'
+        yield f'<path class="moved" d="{_d(points)}"/>{_dot(end, "goal")}</g>'
+
+
+_FRAMES = 60  # of a movement that is controlled
+
+
+def moving_goal() -> str:
+    """Return SVG of a G that is under control: the goal moves while it is made, and an obstacle stands on its path."""
+    shown = kineme.load_lasa(["GShape"])[3]
+    primitive, obstacle = kineme.DMP().learn([shown]), np.array([[-27.0, 0.0]])
+    control = primitive.controller(
+        dt=0.005, avoidance=ObstacleAvoidance(gamma=4500, reach=10.0), end_velocity=[0.0, 0.0]
+    )
+    steps = 5 * round(1.8 * float(primitive.durations[0]) / 0.005 / 5)
+    turned = np.clip((np.arange(steps) / steps - 0.15) / 0.4, 0, 1)
+    goals = primitive.goals[0] + np.column_stack((24 * turned, -14 * np.sin(np.pi * turned)))
+    drifts = np.gradient(goals, 0.005, axis=0)
+    path = np.array(
+        [
+            control.step(goal=goal, goal_velocity=drift, obstacles=obstacle).position
+            for goal, drift in zip(goals, drifts, strict=True)
+        ]
+    )
+    frame = _Frame(110.0, (shown.positions.min(0) + shown.positions.max(0)) / 2, 3.1)
+    points, ends = frame.points(path), frame.points(goals)
+    frames = np.linspace(0, steps - 1, _FRAMES + 1).round().astype(int)
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    share = [f"{78 * k / _FRAMES:.3g}%" for k in range(_FRAMES + 1)]
+    rules = {
+        "pen": [f"{{stroke-dashoffset:{1 - length[k] / length[-1]:.3f}}}" for k in frames],
+        "tip": [_at(points[k]) for k in frames],
+        "goal": [_at(ends[k]) for k in frames],
+    }
+    moves = [
+        f"@keyframes {name}{{{''.join(map(str.__add__, share, steps))}100%{steps[-1]}}}"
+        f".{name}{{animation:{name} {_SECONDS}s linear -{0.9 * _SECONDS:.2g}s infinite}}"
+        for name, steps in rules.items()
+    ]
+    x, y = frame.points(obstacle)[0]
+    label = "A G is made again: it bends around an obstacle, and follows its goal, which moves meanwhile"
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 {_HEIGHT}" role="img" aria-label="{label}">',
+            f"<style>{_COLORS}.paper{{fill:var(--paper)}}path{{fill:none;stroke-linecap:round;stroke-linejoin:round}}"
+            ".gray{stroke:var(--soft);stroke-width:7;opacity:.35}.pen{stroke:var(--pen);stroke-width:4;"
+            "stroke-dasharray:1}.tip{fill:var(--tip)}.goal{fill:var(--moved)}.obstacle{fill:var(--soft)}"
+            f"{''.join(moves)}{_STILL}</style>",
+            f'<rect class="paper" width="520" height="{_HEIGHT}" rx="10"/>',
+            f'<path class="gray" d="{_d(frame.points(shown.positions[::10]))}"/>',
+            f'<circle class="obstacle" cx="{x:.1f}" cy="{y:.1f}" r="9"/>',
+            f'<path class="pen" pathLength="1" d="{_d(points[::5])}"/>',
+            '<circle class="goal" r="8"/><circle class="tip" r="6"/>',
+            "</svg>\n",
+        ]
+    )
+
+
+_STILL = "@media (prefers-reduced-motion:reduce){*{animation-play-state:paused!important}}"
 
 
 def _style() -> str:
     return (
-        ".head{font:600 17px system-ui,sans-serif;text-anchor:middle;fill:#222}"
-        ".name{font:600 17px system-ui,sans-serif;text-anchor:end;fill:#222}"
+        _COLORS + ".head{font:600 17px system-ui,sans-serif;text-anchor:middle;fill:var(--text)}"
+        ".name{font:600 17px system-ui,sans-serif;text-anchor:end;fill:var(--text)}"
+        ".paper{fill:var(--paper)}.empty{fill:var(--empty)}.goal{fill:var(--moved)}.from{fill:var(--soft)}"
         "path{fill:none;stroke-linecap:round;stroke-linejoin:round}"
-        f".gray{{stroke:{GRAY};stroke-width:7;opacity:.35}}"
-        f".pen{{stroke:{BLUE};stroke-width:5;stroke-dasharray:1;animation:draw {_TIME}}}"
-        f".moved{{stroke:{GREEN};stroke-width:2.5;opacity:.85}}"
-        f".tip{{animation:tip {_TIME}}}.bar{{transform-box:fill-box;transform-origin:left}}"
+        ".gray{stroke:var(--soft);stroke-width:7;opacity:.35}"
+        f".pen{{stroke:var(--pen);stroke-width:5;stroke-dasharray:1;animation:draw {_TIME}}}"
+        ".moved{stroke:var(--moved);stroke-width:2.5;opacity:.85}"
+        f".tip{{fill:var(--tip);animation:tip {_TIME}}}"
+        ".bar{transform-box:fill-box;transform-origin:left;fill:var(--soft)}"
         + "".join(f".bar{k}{{animation:bar{k} {_TIME}}}" for k in range(3))
-        + f"@keyframes draw{{0%{{stroke-dashoffset:1}}{_percent(1)}{{stroke-dashoffset:0}}100%{{stroke-dashoffset:0}}}}"
-        "@media (prefers-reduced-motion:reduce)"
-        "{*{animation-play-state:paused!important}}"
+        + ".bar0{fill:var(--pen)}"
+        f"@keyframes draw{{0%{{stroke-dashoffset:1}}{_percent(1)}{{stroke-dashoffset:0}}100%{{stroke-dashoffset:0}}}}"
+        + _STILL
     )
 
 
@@ -134,6 +200,6 @@ def _d(points: np.ndarray) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
-def _dot(point: np.ndarray, color: str, radius: int) -> str:
+def _dot(point: np.ndarray, what: str) -> str:
     x, y = np.ravel(point)
-    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" fill="{color}"/>'
+    return f'<circle class="{what}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>'

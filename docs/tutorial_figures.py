@@ -25,7 +25,7 @@ def gestures() -> Figure:
     figure = new_figure(9.6, 5.0)
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.15))
     with TemporaryDirectory() as place:
-        for _ in walk(_TUTORIALS / "gestures-from-a-camera-or-mouse.md", Path(place), names):
+        for _ in walk(_TUTORIALS / "gestures-live.md", Path(place), names):
             pass
         for axes, path in zip(top.subplots(1, 5), sorted(Path(place, "today").glob("*.csv")), strict=True):
             _draw_take(axes, path)

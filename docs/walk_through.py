@@ -25,8 +25,11 @@ from kineme.cli import main
 DOCS = Path(__file__).parent
 GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
 #: Package -> words of the commands that need it.
-OPTIONAL = {"jax": (), "mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute")}
+OPTIONAL = {"jax": (), "mujoco": ("--simulate",), "torch": (), "unified_planning": ("plan", "execute"), "anywidget": ()}
+#: Package -> how blocks of Python begin that need it, where that is not its import.
+_BEGUN = {"anywidget": "from kineme.notebook import"}
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_AFTER = re.compile(r"^<!-- after: (.+\.md) -->$", re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
 
@@ -50,11 +53,30 @@ def page_name(page: Path) -> str:
     return page.relative_to(DOCS.parent).as_posix()
 
 
+def pages_before(page: Path) -> list[Path]:
+    """Return the page that another one goes on from, in a list; an empty one for a page that begins by itself."""
+    return [page.parent / name for name in _AFTER.findall(page.read_text(encoding="utf-8"))]
+
+
+def text_from_the_beginning(page: Path) -> str:
+    """Return the text of a page, behind that of the pages which it goes on from."""
+    earlier = [text_from_the_beginning(before) for before in pages_before(page)]
+    return "\n".join([*earlier, _AFTER.sub("", page.read_text(encoding="utf-8"))])
+
+
 def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Iterator[Step]:
-    """Run a page in an empty folder, step by step; `names` are what its Python defines."""
+    """Run a page in an empty folder, step by step; `names` are what its Python defines.
+
+    A page that says ``<!-- after: another.md -->`` is run after that one.
+    """
     names = {} if names is None else names
+    for earlier in pages_before(page):
+        for _ in walk(earlier, folder, names):
+            pass
     for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
-        if kind == "python" and any(text.startswith(f"import {package}\n") for package in _missing()):
+        if kind == "python" and text.startswith(
+            tuple(_BEGUN.get(package, f"import {package}\n") for package in _missing())
+        ):
             continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)
 

@@ -11,6 +11,7 @@ import pytest
 
 _ROS_1 = "import rosbag, sensor_msgs.msg, trajectory_msgs.msg, tf2_msgs.msg"
 _ROS_2 = "import rclpy.serialization, sensor_msgs.msg, trajectory_msgs.msg, nav_msgs.msg"
+_SOURCES = Path(__file__).resolve().parents[1] / "src"
 _WHEELS = Path(__file__).resolve().parents[1] / ".venv-ros2/bin/python"
 
 
@@ -30,6 +31,21 @@ def ros_2(program, *arguments, given=None):
     return _output(python, program, *arguments, given=given)
 
 
+def ros_2_with_kineme(program, *arguments, needs="rclpy"):
+    """What a program prints in the Python of ROS 2 that loads kineme, and what it needs, from this environment."""
+    site = [path for path in sys.path if "site-packages" in path]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(_SOURCES), str(Path(__file__).parent / "sensors"), *site]),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(os.getpid() % 100),  # workers do not hear each other
+    }
+    same = f"import sys; assert sys.version_info[:2] == {sys.version_info[:2]}; import {needs}"
+    python = _first_with(same, [os.environ.get("ROS2_PYTHON"), str(_WHEELS), sys.executable])
+    if python is None:
+        pytest.skip(f"no ROS 2 with {needs} for this Python; make ros2")
+    return _output(python, program, *arguments, environment=environment)
+
+
 def _first_with(imports, pythons):
     return next((one for one in pythons if one and _succeeds(one, imports)), None)
 
@@ -42,8 +58,8 @@ def _succeeds(python, program):
         return False
 
 
-def _output(python, program, *arguments, given=None):
+def _output(python, program, *arguments, given=None, environment=None):
     command = [python, "-c", program, *map(str, arguments)]
-    done = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, input=given, capture_output=True, text=True, check=False, env=environment)
     assert not done.returncode, done.stderr
     return done.stdout

@@ -6,6 +6,7 @@ Where no site is named in KINEME_SITE these tests are skipped, so that no old on
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -19,13 +20,14 @@ pytestmark = pytest.mark.skipif(not (SITE / "search.html").is_file(), reason="KI
 KINDS = (
     "index", "start/install", "concepts/movement-primitive", "concepts/glossary", "how-to/file-not-read",
     "gallery/index", "gallery/primitives/plot_formulations", "guide/recordings", "reference/generated/kineme.DMP",
-    "reference/generated/kineme-learn", "beside-others", "search",
+    "reference/generated/kineme-learn", "beside-others", "search", "_static/draw-light",
 )  # fmt: skip
 COLORED = (
     "index",
     "concepts/movement-primitive",
     "reference/generated/kineme.kernels.RBF",
     "reference/generated/kineme-learn",
+    "_static/draw-dark",
 )
 WIDTHS = (390, 820, 1440)
 _STICKS_OUT = """() => [...document.querySelectorAll('article :is(h1, h2, h3, p, table, pre, img)')].filter((one) => {
@@ -49,6 +51,7 @@ QUESTIONS = {
     "poses in the shell": "how-to/poses-in-the-shell",
     "labels from file names": "how-to/labels-from-file-names",
     "rate of a stream": "how-to/rate-of-a-stream",
+    "lab streaming layer": "how-to/sensors",
     "trim rests": "how-to/trim-rests",
     "units millimeters": "how-to/units",
     "my file is not read": "how-to/file-not-read",
@@ -74,6 +77,18 @@ QUESTIONS = {
     "kineme annotate": "reference/generated/kineme-annotate",
     "Primitives.rollout": "reference/generated/kineme.dmp.Primitives",
     "Recognizer": "reference/generated/kineme.Recognizer",
+    "draw in the browser": "guide/page",
+    "early recognition": "guide/early-and-live",
+    "scikit-learn pipeline": "guide/scikit-learn",
+    "websocket": "guide/studio-network",
+}
+#: Questions that were asked in vain -> the page that has to come first.
+MISSED = {
+    "rerun": "how-to/rerun",
+    "jupyter notebook": "guide/notebooks",
+    "confusion matrix": "guide/notebooks",
+    "real robot ur5": "guide/robots",
+    "save model": "guide/moving-again",
 }
 #: Error messages with what stood in them -> how the entry of the page of messages begins.
 MESSAGES = {
@@ -114,9 +129,26 @@ def test_the_answer_is_among_the_first_three_that_are_found(searching, question)
     assert QUESTIONS[question] in found
 
 
+@pytest.mark.parametrize("question", MISSED)
+def test_the_answer_comes_first(searching, question):
+    found = [page for page, _ in searching.evaluate(_ASK, question)]
+    assert found[-1] == MISSED[question]
+
+
+@pytest.mark.parametrize("question", ["export", "rerun", "matrix", "a file"])
+def test_templates_of_messages_come_last(searching, question):
+    """Unless the question is one of them; some are found all the same."""
+    found = searching.evaluate("(asked) => Search._performSearch(asked).map((line) => line[2])", question)[::-1]
+    are_messages = [place.startswith("#message-") for place in found]
+    assert any(are_messages)
+    assert are_messages == sorted(are_messages)
+
+
 @pytest.mark.parametrize("message", MESSAGES)
 def test_an_error_message_is_found_with_what_stood_in_it(searching, message):
-    found = [title for page, title in searching.evaluate(_ASK, message) if page == "reference/generated/messages"]
+    found = [
+        title for page, title in searching.evaluate(_ASK, message) if page.startswith("reference/generated/messages-")
+    ]
     assert any(title.startswith(MESSAGES[message]) for title in found), found
 
 
@@ -137,6 +169,55 @@ def test_no_serious_rule_of_accessibility_is_broken(pages, scheme, kinds):
         found = axe.Axe().run(page, options=options).response["violations"]
         serious = [one for one in found if one["impact"] in {"serious", "critical"}]
         assert [(one["id"], [node["html"][:120] for node in one["nodes"][:3]]) for one in serious] == [], kind
+
+
+#: Pages that are longer, and why.
+LONG = {
+    "reference/names": "all names on one page, to be searched by the browser",
+    "reference/generated/kineme.ActionLibrary": "one class",
+    "reference/generated/kineme.Demonstrations": "one class",
+    "reference/generated/kineme.Recognizer": "one class",
+    "reference/generated/kineme.dmp.Primitives": "one class",
+}
+
+
+def _amount(file):
+    """Letters, lines of tables and pictures of a page, which make it long."""
+    article = file.read_text(encoding="utf-8").partition("<article")[2].partition("</article>")[0]
+    return len(re.sub(r"<[^>]*>", "", article)) + 100 * article.count("<tr") + 3000 * article.count("<img")
+
+
+def test_no_page_is_longer_than_six_thousand_pixels(pages):
+    """Of the forty that hold most, at the width of a laptop."""
+    page = pages.new(width=1440)
+    files = [file for file in SITE.rglob("*.html") if not file.relative_to(SITE).parts[0].startswith("_")]
+    heights = {}
+    for file in sorted(files, key=_amount)[-40:]:
+        page.goto(file.resolve().as_uri())
+        name = file.relative_to(SITE).with_suffix("").as_posix()
+        heights[name] = page.evaluate("document.documentElement.scrollHeight")
+    assert {name: height for name, height in heights.items() if height > 6000 and name not in LONG} == {}
+    assert min(heights.values()) < 4500, "more pages have to be measured"
+
+
+def test_pictures_have_their_own_colors_in_the_dark(pages):
+    """The theme would make them gray."""
+    page = pages.new(color_scheme="dark")
+    for kind in ("index", "guide/robots", "gallery/index"):
+        page.goto((SITE / f"{kind}.html").resolve().as_uri())
+        filters = page.evaluate("[...document.images].map((picture) => getComputedStyle(picture).filter)")
+        assert set(filters) == {"none"}, kind
+
+
+def test_the_first_page_has_one_to_draw_in_by_light_and_in_the_dark(pages):
+    page = pages.new(color_scheme="dark")
+    page.goto((SITE / "index.html").resolve().as_uri())
+    assert page.locator("iframe.draw-here").get_attribute("src") == "_static/draw-dark.html"
+    page.evaluate("document.documentElement.dataset.theme = 'light'")
+    page.locator("iframe.draw-here[src='_static/draw-light.html']").wait_for()
+    inside = page.frame_locator("iframe.draw-here")
+    inside.get_by_role("button", name="Z", exact=True).click()
+    assert inside.locator("#verdict").inner_text() == "Z"
 
 
 def test_nothing_sticks_out(pages):

@@ -16,8 +16,8 @@ from walk_through import DOCS, otherwise, page_name, pages, shown_by, walk
 import kineme
 from kineme.cli import main
 
-TUTORIAL = DOCS / "tutorials" / "action-library.md"  # test_tutorial.py runs it, and looks at more
-PAGES = [page for page in pages() if page != TUTORIAL]
+TUTORIAL = sorted((DOCS / "tutorials").glob("action-library*.md"))  # test_tutorial.py runs it, and looks at more
+PAGES = [page for page in pages() if page not in TUTORIAL]
 MODULES = [
     module.name for module in pkgutil.walk_packages(kineme.__path__, "kineme.")
     if not module.name.endswith("__main__") and (find_spec("torch") or not module.name.startswith("kineme.torch."))
@@ -31,7 +31,7 @@ def test_pages_run_and_print_what_they_show(page, tmp_path):
     assert not others
 
 
-@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=page_name)
+@pytest.mark.parametrize("page", [*PAGES, *TUTORIAL], ids=page_name)
 def test_pages_show_what_every_print_prints(page):
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     for block in blocks:
@@ -91,7 +91,7 @@ _FENCED = re.compile(r"^(`{3,})([^`\n]*)\n.*?^\1$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(r"`kineme ([^`]+)`")
 
 
-@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=page_name)
+@pytest.mark.parametrize("page", [*PAGES, *TUTORIAL], ids=page_name)
 def test_commands_and_options_in_sentences_exist(page):
     """Between backticks, where arguments may be missing; and no block of bash holds one, which nobody would try."""
     text = page.read_text(encoding="utf-8")

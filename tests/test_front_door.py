@@ -22,12 +22,12 @@ MODULES = [
 ]
 NAMES = [(module, name) for module in MODULES for name in import_module(module).__all__]
 #: Chapters that an optional package is needed for, whatever is asked of them.
-OPTIONAL = {"kineme.torch": "torch"}
+OPTIONAL = {"kineme.torch": "torch", "kineme.notebook": "anywidget"}
 
 
 def _skip_without_package(module):
     if module in OPTIONAL:
-        pytest.importorskip(OPTIONAL[module], reason=f"the extra {OPTIONAL[module]} is not installed")
+        pytest.importorskip(OPTIONAL[module], reason=f"the package {OPTIONAL[module]} is not installed")
 
 
 @pytest.mark.parametrize(("module", "name"), NAMES)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from make_interactive import FOLDER, FORMULATIONS, N_BASIS, N_POINTS, html, matrices, write
+from make_interactive import FOLDER, FORMULATIONS, N_BASIS, N_POINTS, html, matrices, pages_to_draw_in, write
 
 import kineme
 
@@ -139,4 +140,36 @@ def test_the_view_grows_with_a_path_that_a_goal_far_out_leads_beyond_it(tmp_path
     assert plane.bounding_box() == pytest.approx(box, abs=1)  # what comes into view takes no more room
     assert box["x"] < path["x"]
     assert path["x"] + path["width"] < box["x"] + box["width"]
+    page.close()
+
+
+@pytest.mark.parametrize(("scheme", "paper"), [("light", "rgb(255, 255, 255)"), ("dark", "rgb(23, 27, 31)")])
+def test_a_letter_is_recognized_and_moved_within_another_page(tmp_path, browser, scheme, paper):
+    """In the colors of its name whatever the system likes, from a file, and no request leaves it."""
+    for file, text in pages_to_draw_in().items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    around = tmp_path / "index.html"
+    frame = f'<iframe src="draw-{scheme}.html" style="width: 900px; height: 600px; margin: 90px"></iframe>'
+    around.write_text(f"<!doctype html><meta charset=utf-8><title>x</title>{frame}", encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1200, "height": 800}, color_scheme="light")
+    wrong, requests = [], []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(around.as_uri())
+    inside = page.frames[1]
+    assert inside.evaluate("getComputedStyle(document.querySelector('.stage')).backgroundColor") == paper
+    box = inside.locator("#stage").bounding_box()
+    corners = np.array([[-90.0, -90.0], [90.0, -90.0], [-90.0, 90.0], [90.0, 90.0]])
+    path = np.concatenate([np.linspace(a, b, 20) for a, b in pairwise(corners)])
+    path += [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+    page.mouse.move(*path[0])
+    page.mouse.down()
+    for point in path:
+        page.mouse.move(*point)
+        page.wait_for_timeout(12)
+    page.mouse.up()
+    inside.locator("#verdict", has_text="Z").wait_for()
+    inside.locator("#save").wait_for(state="hidden")
+    assert not wrong
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in requests)
     page.close()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from result_tables import motion_layer, planning
+from result_tables import large_archives, motion_layer, planning
 from result_tables.__main__ import GUIDES
 from result_tables.measured import filled
 
@@ -13,7 +13,7 @@ def test_the_page_shows_what_was_measured(module):
     assert page == filled(page, module.tables()), "run make tables"
 
 
-OF_SEVERAL = motion_layer.tables() | planning.tables()
+OF_SEVERAL = large_archives.tables() | motion_layer.tables() | planning.tables()
 
 
 @pytest.mark.parametrize("page", OF_SEVERAL, ids=lambda page: page.name)

@@ -61,12 +61,12 @@ def test_code_over_two_lines_and_formulas_with_words_are_read():
     assert text.rstrip().endswith("``goal + duration * v``")
 
 
-def test_every_route_of_the_studio_is_on_its_page():
+def test_every_route_of_the_studio_is_on_one_page():
     described = routes.description()
-    text = dict(routes.pages())["routes.md"]
+    text = "".join(text for _, text in routes.pages())
     for path, ways in described["paths"].items():
-        assert all(f"### {way.upper()} {path}\n" in text for way in ways)
-    assert all(f"\n### {name}\n" in text for name in described["components"]["schemas"])
+        assert all(text.count(f"\n## {way.upper()} {path}\n") == 1 for way in ways)
+    assert all(text.count(f"\n### {name}\n") == 1 for name in described["components"]["schemas"])
     assert "Takes [RolloutRequest](#json-RolloutRequest)." in text
     assert "| `error_rate` (optional) | number; above 0; below 1; default `0.05` |" in text
 
@@ -79,7 +79,8 @@ def test_arrows_of_the_navigation_have_names():
 
 def test_every_command_has_a_page():
     """With an example, of its help or of a page, where all are tried; here those that no page shows."""
-    assert set(dict(commands.pages())) == {"commands.rst", *(f"kineme-{name}.rst" for name in main.commands)}
+    named = {*main.commands, *(f"library-{name}" for name in main.commands["library"].commands)}
+    assert set(dict(commands.pages())) == {"commands.rst", *(f"kineme-{name}.rst" for name in named)}
 
 
 def test_examples_of_a_help_stand_under_their_heading():
@@ -190,3 +191,23 @@ def test_the_first_picture_is_whole_when_it_begins():
     delays = re.findall(r"animation:\w+ 9.0s linear( -7.6s)? infinite", picture)
     assert len(delays) == 11
     assert all(delays)
+
+
+@pytest.mark.parametrize("name", ["kineme", "moving-goal"])
+def test_moving_pictures_are_small_and_look_right_in_the_dark_and_without_motion(name):
+    picture = (DOCS / "images" / f"{name}.svg").read_text(encoding="utf-8")
+    assert len(picture) < 20_000
+    assert "@media (prefers-color-scheme:dark){:root{--paper:none;" in picture
+    assert "@media (prefers-reduced-motion:reduce)" in picture
+    assert not re.search(r'fill="#', picture)  # colors that would stay as they are
+
+
+def test_a_movement_ends_at_the_goal_that_moved():
+    picture = (DOCS / "images" / "moving-goal.svg").read_text(encoding="utf-8")
+    places = {
+        name: [float(x) for x in re.findall(rf"@keyframes {name}{{.*?100%{{transform:translate\((.+?)px,", picture)]
+        for name in ("tip", "goal")
+    }
+    starts = re.findall(r"@keyframes goal{0%{transform:translate\((.+?)px,", picture)
+    assert abs(places["tip"][0] - places["goal"][0]) < 8
+    assert places["goal"][0] - float(starts[0]) > 50

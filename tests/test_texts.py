@@ -74,7 +74,10 @@ def test_marks_without_ink_are_written_out(mark):
 def test_every_way_of_showing_a_name_is_harmless(name):
     table = Table(name, (name, "n"), [(name, "1"), ("x", name)], name)
     assert not _obeyed(to_text(table))
-    for markup in (to_html(table), page(name, name, to_html(table), {name: name}).removeprefix("<!doctype html>\n")):
+    for markup in (
+        to_html(table),
+        page(name, name, [name], to_html(table), {name: name}).removeprefix("<!doctype html>\n"),
+    ):
         ElementTree.fromstring(
             markup.replace('<meta charset="utf-8">', "").replace('initial-scale=1">', 'initial-scale=1"/>')
         )

@@ -4,17 +4,18 @@ import re
 from pathlib import Path
 
 import pytest
-from walk_through import otherwise, walk
+from walk_through import otherwise, text_from_the_beginning, walk
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "tutorials" / "action-library.md"
+TEXT = text_from_the_beginning(DOCS / "tutorials" / "action-library-in-python.md")  # three pages
 
 
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory):
-    """The folder that the page leaves behind, and its steps."""
+    """The folder that the pages leave behind, and their steps; each is run once."""
     folder = tmp_path_factory.mktemp("tutorial")
-    return folder, list(walk(PAGE, folder))
+    (folder.parent / "tutorial.md").write_text(TEXT, encoding="utf-8")
+    return folder, list(walk(folder.parent / "tutorial.md", folder))
 
 
 def _fails(step):
@@ -37,7 +38,7 @@ def test_every_answer_is_the_one_shown(walked):
 def test_every_picture_is_one_that_the_commands_draw(walked):
     """images/library-NAME.png is NAME.png of the walk; make figures copies them."""
     folder, _ = walked
-    pictures = re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", PAGE.read_text(encoding="utf-8"))
+    pictures = re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", TEXT)
     assert pictures
     for name in pictures:
         assert list(folder.rglob(f"{name}.png")), name

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from walk_through import page_name, pages
+from walk_through import page_name, pages, text_from_the_beginning
 
 ROOT = Path(__file__).parents[1]
 PAGES = pages()
@@ -82,7 +82,7 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     modules = [_module(page) for page in PAGES]
     for page, module in zip(PAGES, modules, strict=True):
-        blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+        blocks = re.findall(r"```python\n(.*?)```", text_from_the_beginning(page), re.DOTALL)
         (folder / f"{module}.py").write_text("\n".join(blocks), encoding="utf-8")
     (folder / "results.py").write_text(RESULTS)
     settings = folder / "pyproject.toml"

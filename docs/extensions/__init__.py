@@ -45,6 +45,13 @@ def _write_pages(app: Sphinx) -> None:
     make_interactive.write()
 
 
+def _add_pages_to_draw_in(app: Sphinx, error: Exception | None) -> None:
+    """Add the pages that the first page of the site shows."""
+    if error is None and app.builder.format == "html":
+        for file, text in make_interactive.pages_to_draw_in().items():
+            (Path(app.outdir) / "_static" / file).write_text(text, encoding="utf-8")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect what stands in this folder."""
     app.connect("builder-inited", leftovers.remove_scripts, priority=100)  # before the gallery is made
@@ -58,6 +65,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("env-updated", entries.keep)
     app.connect("html-page-context", readers.mend_page, priority=900)
     app.connect("build-finished", mathjax.copy_mathjax)
+    app.connect("build-finished", _add_pages_to_draw_in)
     app.connect("build-finished", leftovers.remove_pages, priority=800)
     app.connect("build-finished", whole.check_site, priority=900)
     app.add_directive("cited-in", equations.CitedIn)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import click
 from walk_through import pages as written_pages
@@ -36,25 +36,32 @@ def pages() -> Iterator[tuple[str, str]]:
             f"   * - :doc:`kineme {name} <kineme-{name}>`",
             f"     - {main.commands[name].get_short_help_str(90)}",
         ]
-        yield f"kineme-{name}.rst", "\n".join(_command(main.commands[name], f"kineme {name}", "=", examples))
-    lines += ["", ".. toctree::", "   :hidden:", "", *(f"   kineme-{name}" for name in names), ""]
-    yield "commands.rst", "\n".join(lines)
+        yield from _command(main.commands[name], f"kineme {name}", examples)
+    yield "commands.rst", "\n".join([*lines, "", _toctree(f"kineme-{name}" for name in names)])
 
 
-def _command(command: click.Command, path: str, rule: str, examples: dict[str, list[str]]) -> list[str]:
+def _command(command: click.Command, path: str, examples: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
+    """The page of a command, and those of the commands below it."""
     context = click.Context(command, info_name=path)
-    lines = _title(path, rule)
+    file = path.replace(" ", "-")
+    lines = _title(path, "=")
     if isinstance(command, click.Group):
-        lines += _text(command.help or "")
-        for name, below in sorted(command.commands.items()):
-            if not below.hidden:
-                lines += _command(below, f"{path} {name}", "-", examples)
-        return lines
+        below = {name: one for name, one in sorted(command.commands.items()) if not one.hidden}
+        lines += [*_text(command.help or ""), ".. list-table::", ""]
+        for name, one in below.items():
+            lines += [f"   * - :doc:`{path} {name} <{file}-{name}>`", f"     - {one.get_short_help_str(90)}"]
+            yield from _command(one, f"{path} {name}", examples)
+        yield f"{file}.rst", "\n".join([*lines, "", _toctree(f"{file}-{name}" for name in below)])
+        return
     usage = " ".join([path, *command.collect_usage_pieces(context)])
     lines += [*_text(command.help or ""), ".. code-block:: text", "", f"   {usage}", ""]
     shown = examples.get(path) or EXAMPLES[path]
     lines += ["**As in**", "", ".. code-block:: bash", "", *(f"   {one}" for one in shown[:_MOST]), ""]
-    return [*lines, f".. program:: {path}", "", *_options(command, context)]
+    yield f"{file}.rst", "\n".join([*lines, f".. program:: {path}", "", *_options(command, context)])
+
+
+def _toctree(files: Iterable[str]) -> str:
+    return "\n".join([".. toctree::", "   :hidden:", "", *(f"   {file}" for file in files), ""])
 
 
 def _title(text: str, rule: str) -> list[str]:

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
     from sphinx.environment import BuildEnvironment
 
-_MESSAGES = "reference/generated/messages"
+_MESSAGES = "reference/generated/messages-"
 
 
 def place_messages(app: Sphinx, doctree: nodes.document) -> None:
-    """Give each message of the page of messages a place, to which the search leads."""
-    if app.env.docname == _MESSAGES:
+    """Give each message of a page of messages a place, to which the search leads."""
+    if app.env.docname.startswith(_MESSAGES):
         for k, item in enumerate(doctree.findall(nodes.list_item)):
             item["ids"].append(f"message-{k}")
 
@@ -25,10 +25,11 @@ def place_messages(app: Sphinx, doctree: nodes.document) -> None:
 def add_messages(app: Sphinx) -> list[tuple[str, dict[str, Any], str]]:
     """Put the messages among the titles that the search reads: Sphinx writes entries of the index in lower case."""
     indexer = getattr(app.builder, "indexer", None)
-    if indexer is not None and _MESSAGES in app.env.found_docs:
-        titles = [one for one in indexer._all_titles.get(_MESSAGES, ()) if not str(one[1]).startswith("message-")]
-        items = app.env.get_doctree(_MESSAGES).findall(nodes.list_item)
-        indexer._all_titles[_MESSAGES] = [
+    pages = [page for page in app.env.found_docs if page.startswith(_MESSAGES)] if indexer is not None else []
+    for page in pages:
+        titles = [one for one in indexer._all_titles.get(page, ()) if not str(one[1]).startswith("message-")]
+        items = app.env.get_doctree(page).findall(nodes.list_item)
+        indexer._all_titles[page] = [
             *titles,
             *((" ".join(item.astext().split()), item["ids"][0]) for item in items),
         ]

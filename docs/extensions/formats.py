@@ -50,7 +50,7 @@ _WRITTEN = {
 def pages() -> Iterator[tuple[str, str]]:
     """File name and text of each page, in Markdown."""
     yield "formats.md", "\n".join(_formats())
-    yield "schemas.md", "\n".join(_schemas())
+    yield from _schemas()
 
 
 def _formats() -> Iterator[str]:
@@ -76,7 +76,7 @@ def _formats() -> Iterator[str]:
 _HEAD = ("key", "kind", "what it is")
 
 
-def _schemas() -> Iterator[str]:
+def _schemas() -> Iterator[tuple[str, str]]:
     answer, grounding = (
         json.loads(files(package).joinpath(name).read_text(encoding="utf-8"))
         for package, name in (
@@ -84,18 +84,22 @@ def _schemas() -> Iterator[str]:
             ("kineme.anchoring", "grounding.schema.json"),
         )
     )
-    yield "# JSON schemas\n\n## Answer to a movement\n"
-    yield f"{answer['description']} [Answers](../answers.md) has an example. In the package the schema is"
-    yield f"`kineme/recognition/answer.schema.json`. Its name is `{answer['$id']}`.\n"
-    yield from table(_HEAD, list(_keys(answer, "")))
-    yield f"\n### State of a movement under way\n\n{answer['$defs']['state']['description']}\n"
-    yield from table(_HEAD, list(_keys(answer["$defs"]["state"], "")))
-    yield _dropdown(answer)
-    yield "\n## Grounding of a symbol\n"
-    yield f"{grounding['description']}\n\nWritten by `kineme library ground`; the schema itself by"
-    yield f"`kineme library schema`. Its name is `{grounding['$id']}`.\n"
-    yield from table(_HEAD, list(_keys(grounding, "")))
-    yield _dropdown(grounding)
+    about = (
+        "# JSON schema of an answer\n",
+        f"{answer['description']} [Answers](../answers.md) has an example. In the package the schema is",
+        f"`kineme/recognition/answer.schema.json`. Its name is `{answer['$id']}`.\n",
+        *table(_HEAD, list(_keys(answer, ""))),
+        f"\n## State of a movement under way\n\n{answer['$defs']['state']['description']}\n",
+        *table(_HEAD, list(_keys(answer["$defs"]["state"], ""))),
+    )
+    yield "schema-answer.md", "\n".join([*about, _dropdown(answer)])
+    about = (
+        "# JSON schema of a grounding\n",
+        f"{grounding['description']}\n\nWritten by `kineme library ground`; the schema itself by",
+        f"`kineme library schema`. Its name is `{grounding['$id']}`.\n",
+        *table(_HEAD, list(_keys(grounding, ""))),
+    )
+    yield "schema-grounding.md", "\n".join([*about, _dropdown(grounding)])
 
 
 def _dropdown(schema: dict[str, Any]) -> str:

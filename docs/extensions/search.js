@@ -2,7 +2,7 @@
  * How the search orders pages. Sphinx wants every word of a question in a page, and counts none more than another. Here
  * a word counts the more the fewer pages hold it, some words may be missing, titles, index entries and error messages
  * count by how much of them was asked for and most of all where they are what was typed, and pages written for readers
- * come before those that list names.
+ * come before those that list names. Error messages come last, unless a whole one was typed.
  */
 const Ranking = {
   /** The first part of a page's address that is listed -> how much its pages count, and what they are called. */
@@ -17,7 +17,7 @@ const Ranking = {
     migrating: [1, "Migrating"],
     "reference/equations": [1, "Reference"],
     "reference/generated/kineme-": [1, "Command"],
-    "reference/generated/messages": [1, "Error message"],
+    "reference/generated/messages": [0.5, "Error message"],
     "reference/generated": [0.9, "Reference"],
     gallery: [0.85, "Gallery"],
     decisions: [0.7, "Decision"],
@@ -26,6 +26,8 @@ const Ranking = {
   most: 25,
   isMessage: (line) => /^message-\d+$/.test(line?.id ?? ""),
   mostMessages: 6,
+  /** A question is a message that somebody met if it has as many stems, or is nearly all of one. */
+  typed: (asked, score) => asked.length >= 4 || score > 0.9,
 
   /** Stems of the words of a text that say something; names such as load_lasa also by their parts. */
   words: (text) => {
@@ -110,7 +112,10 @@ const Ranking = {
         found.push([page, line, (text + 2 * (line?.score ?? 0)) * Ranking.chapter(name)[0]]);
     });
     messages.sort((a, b) => b.score - a.score).splice(Ranking.mostMessages);
-    for (const line of messages) if (line.score > 0.4) found.push([line.page, line, 1 + 2 * line.score]);
+    const last = [];
+    for (const line of messages)
+      if (line.score > 0.4)
+        (Ranking.typed(asked, line.score) ? found : last).push([line.page, line, 1 + 2 * line.score]);
     const item = ([page, line, score]) => {
       const here = line && line.score > 0.3 && line.id ? `#${line.id}` : "";
       const message = Ranking.isMessage(line);
@@ -129,10 +134,8 @@ const Ranking = {
         message ? "index" : "text",
       ];
     };
-    return found
-      .sort((a, b) => a[2] - b[2])
-      .slice(-Ranking.most)
-      .map(item);
+    const inOrder = (results) => results.sort((a, b) => a[2] - b[2]);
+    return [...inOrder(last), ...inOrder(found).slice(last.length - Ranking.most)].map(item);
   },
 
   chapter: (name) => Ranking.chapters[Object.keys(Ranking.chapters).find((start) => name.startsWith(start))],

@@ -27,6 +27,7 @@ SUBJECTS = (
     "recognize",
     "recognize_files",
     "stream",
+    "sensors",
     "early",
     "monitor",
     "spotting",

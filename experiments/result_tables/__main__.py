@@ -16,11 +16,11 @@ from result_tables import exported, large_archives, motion_layer, planning
 from result_tables import modulation as modulation_tables
 from result_tables import outliers as outlier_tables
 from result_tables import people as people_tables
+from result_tables import sensors as sensor_tables
 from result_tables.measured import DOCS, RESULTS, figures, fill, rows, table
 
-#: Pages of the guide besides that one about recognition.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables, large_archives)
-PAGE = DOCS / "guide" / "recognition.md"
+#: Pages of the guide with one table or a few.
+GUIDES = (adapting_tables, modulation_tables, outlier_tables, sensor_tables)
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "the defaults": ("", ("defaults",)),
@@ -58,18 +58,21 @@ DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-def tables() -> dict[str, str]:
-    """Name of each table of the page about recognition -> its lines."""
-    evaluated = beside_tables.evaluated()
+def recognition() -> dict[Path, dict[str, str]]:
+    """Each page about recognition -> names of its tables and sentences -> their lines."""
+    evaluated, people = beside_tables.evaluated(), people_tables.tables()
+    measured = {
+        "recognition-defaults": {"defaults": _defaults(), "many": _many(), "nested": _nested()},
+        "recognition-beside-others": {
+            "people": table(*evaluated["people"]),
+            "lasa": table(*evaluated["shapes"]),
+            "open-set": table(*evaluated["unknown"]),
+            "strangers": _strangers(),
+        },
+        "early-and-live": {"stream": _stream()},
+    }
     return {
-        "defaults": _defaults(),
-        "many": _many(),
-        "nested": _nested(),
-        "people": table(*evaluated["people"]),
-        "lasa": table(*evaluated["shapes"]),
-        "open-set": table(*evaluated["unknown"]),
-        "strangers": _strangers(),
-        "stream": _stream(),
+        DOCS / "guide" / f"{page}.md": measured.get(page, {}) | people.get(page, {}) for page in {**measured, **people}
     }
 
 
@@ -172,12 +175,11 @@ def take_in(name: str, evaluated: Path) -> None:
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
         take_in(argument.partition("=")[0], Path(argument.partition("=")[2]))
-    fill(PAGE, tables())
     for module in GUIDES:
         fill(module.PAGE, module.tables())
     fill(exported.PAGE, exported.tables())
     fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
-    for guide, texts in (motion_layer.tables() | planning.tables()).items():
+    for guide, texts in (recognition() | large_archives.tables() | motion_layer.tables() | planning.tables()).items():
         fill(guide, texts)
     for page, texts in beside_tables.tables().items():
         fill(DOCS / page, texts)

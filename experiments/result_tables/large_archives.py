@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from result_tables.measured import DOCS, rows
 
-PAGE = DOCS / "guide" / "large-archives.md"
+PAGE, NEAREST = DOCS / "guide" / "large-archives.md", DOCS / "guide" / "nearest.md"
 _COUNTS = tuple(10**k for k in range(4, 10))
 _DAY = 86_400.0  # s
 _OF_A_DAY = ("inspect [core-s]", "learn [core-s]", "nearest of all, one [core-s]")
@@ -39,8 +40,8 @@ class Law(NamedTuple):
         return max(abs(value / (self.offset + self.slope * count) - 1.0) for count, value in self.measured.items())
 
 
-def tables() -> dict[str, str]:
-    """Name of each table or sentence of the page -> its text."""
+def tables() -> dict[Path, dict[str, str]]:
+    """Page -> name of each of its tables and sentences -> its text."""
     laws = _laws()
     heads = ["movements", *laws, "cores for a day of inspecting and learning"]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
@@ -61,7 +62,8 @@ def tables() -> dict[str, str]:
         f"No process took more than {memory:.0f} MB, whatever the archive; two workers took {more:.2f} times the "
         "processor time of one, their start included."
     )
-    return {"costs": "\n".join([*lines, "", sentence, of_workers]), "search": _search()}
+    costs = "\n".join([*lines, "", sentence, of_workers])
+    return {PAGE: {"costs": costs}, NEAREST: {"search": _search()}}
 
 
 #: Row of the table of searches -> what was measured, and whether it is a time.

@@ -1,12 +1,11 @@
-"""Tables and sentences of docs/guide/recognition.md on people, beginnings and recordings, from the files of results."""
+"""Tables and sentences on people, beginnings and recordings in the pages about recognition, from the results."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from result_tables.measured import DOCS, figures, rows
+from result_tables.measured import figures, rows
 
-PAGE = DOCS / "guide" / "recognition.md"
 SHARES = ("25 %", "50 %", "75 %", "90 %", "100 %", "predict")
 #: Set of movements in the results -> how the page says it.
 DECIDED = {
@@ -26,18 +25,19 @@ EARLIER = {
 SPOTTED = ("with rests", "without", "with rests, among unknown", "without, among unknown")
 
 
-def tables() -> dict[str, str]:
-    """Name of each table or sentence -> its text."""
+def tables() -> dict[str, dict[str, str]]:
+    """Page of the guide -> name of each table or sentence -> its text."""
     return {
-        "vertical": _vertical(),
-        "classifiers": _classifiers(),
-        "earliness": _earliness(),
-        "beginnings": _beginnings(),
-        "halves": _halves(),
-        "earlier": _earlier(),
-        "decided": _decided(),
-        "sure": _sure(),
-        "spotting": _spotting(),
+        "recognition-defaults": {"vertical": _vertical(), "classifiers": _classifiers()},
+        "early-and-live": {
+            "earliness": _earliness(),
+            "beginnings": _beginnings(),
+            "halves": _halves(),
+            "earlier": _earlier(),
+            "decided": _decided(),
+            "sure": _sure(),
+        },
+        "spotting": {"spotting": _spotting()},
     }
 
 

@@ -6,7 +6,9 @@ from typing import Any
 
 from result_tables.measured import DOCS, figures, rows
 
-MONITOR, PLANNER, ROBOTS = (DOCS / f"{name}.md" for name in ("how-to/monitor", "how-to/planner", "guide/robots"))
+MONITOR, PLANNER, ROBOTS = (
+    DOCS / f"{name}.md" for name in ("how-to/monitor", "how-to/planner", "guide/robots-simulated")
+)
 #: Set and movements of the benchmark -> what they are called on the page.
 _MOVEMENTS = {
     "letters2d, same person": "letters, others by the same hand",

@@ -1,4 +1,4 @@
-"""Nested validation in docs/guide/recognition.md: accuracies are those of `Recognizer`, and people stay apart."""
+"""Nested validation in docs/guide/recognition-defaults.md: accuracies of `Recognizer`, and people stay apart."""
 
 from __future__ import annotations
 

@@ -258,9 +258,9 @@ def _results(subject):
 
 
 def test_the_page_shows_what_was_measured():
-    """docs/guide/recognition.md against experiments/results/open_set.json."""
+    """docs/guide/unknown-movements.md against experiments/results/open_set.json."""
     measured = {row["what"]: row["ours"] for row in _results("open_set")}
-    page = " ".join((ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "guide" / "unknown-movements.md").read_text(encoding="utf-8").split())
     for name, title in TABLE.items():
         found = [[measured.get(f"{name}, {n} shown: {what}") for what in SHOWN] for n in (1, 2, 4, 8)]
         cells = ["-" if known is None else f"{known:.0f} % / {unknown:.0f} %" for known, unknown in found]
@@ -273,9 +273,9 @@ def test_the_page_shows_what_was_measured():
 
 
 def test_the_page_shows_how_often_words_are_right():
-    """docs/guide/recognition.md against experiments/results/certainty.json."""
+    """docs/guide/unknown-movements.md against experiments/results/certainty.json."""
     rows = {row["what"]: row for row in _results("certainty")}
-    page = (ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guide" / "unknown-movements.md").read_text(encoding="utf-8")
     for name in ("gestures3d", "letters2d", "strokes2d", "multistrokes2d", "words2d", "signs2d", "exercises6d"):
         for word in ("sure", "probably", "looks like"):
             row = rows.get(f"{name}, {word}: right")

@@ -82,10 +82,10 @@ def test_one_demonstration_does_not_keep_the_error_rate_and_five_do(one_shot):
 
 
 def test_the_page_shows_what_was_measured(one_shot):
-    """docs/guide/recognition.md against experiments/results/one_shot.json, and one number of that measured again."""
+    """docs/guide/unknown-movements.md against the results of one_shot, and one number of that measured again."""
     rows = json.loads((ROOT / "experiments" / "results" / "one_shot.json").read_text())["rows"]
     measured = {row["what"]: row["ours"] for row in rows}
-    page = (ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guide" / "unknown-movements.md").read_text(encoding="utf-8")
     for n_shown, words in ((1, "one"), (5, "five")):
         values = [
             f"{measured[f'shapes that differ by {spread:.0%}, {n_shown} shown']:.1f} %" for spread in one_shot.SPREADS

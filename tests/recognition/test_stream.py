@@ -245,3 +245,31 @@ def test_nothing_is_loaded_while_a_movement_is_under_way():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_an_answer_up_to_a_stamp_is_that_of_a_stream_that_ended_there(recognizer, movement):
+    live, shorter = recognizer.stream(), recognizer.stream()
+    rest = np.repeat(movement.positions[-1:], 50, axis=0)
+    after = movement.times[-1] + np.arange(1, 51) / 100
+    live.update(np.append(movement.times, after), np.concatenate((movement.positions, rest)))
+    shorter.update(movement.times, movement.positions)
+    assert live.finish(until=movement.times[-1]).probabilities == shorter.finish().probabilities
+    assert live.movement(until=movement.times[-1]).duration == movement.duration
+    assert live.movement().duration > movement.duration
+    with pytest.raises(TrajectoryError):
+        live.finish(until=movement.times[2])
+
+
+def test_to_remember_an_answer_is_the_second_half_of_next(recognizer, movement):
+    at_once, apart = recognizer.stream(), recognizer.stream()
+    for live in (at_once, apart):
+        live.update(movement.times, movement.positions)
+    answer = apart.finish()
+    assert at_once.next().probabilities == answer.probabilities
+    apart.remember(answer)
+    apart.reset()
+    half = len(movement.times) // 2
+    states = [live.update(movement.times[:half], movement.positions[:half]) for live in (at_once, apart)]
+    assert states[0].ranked == states[1].ranked
+    fresh = recognizer.stream().update(movement.times[:half], movement.positions[:half])
+    assert states[0].ranked != fresh.ranked

@@ -17,7 +17,7 @@ import uvicorn
 
 from kineme import ActionLibrary, Trajectory
 from kineme.studio.server.app import create_app
-from kineme.studio.server.serve import config_of
+from kineme.studio.server.connections import config_of
 
 TOKEN = "a-token-for-tests-only"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}

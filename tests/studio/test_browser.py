@@ -447,7 +447,9 @@ def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened,
 def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_letters, monkeypatch):
     page = opened(served_letters)
     shown = page.locator("#live-source pre").all_text_contents()
-    documented = re.findall(r"```(?:py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL)
+    documented = re.findall(
+        r"```(?:py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio-network.md").read_text(), re.DOTALL
+    )
     host = served_letters.address.removeprefix("http://")
     assert shown == [text.strip().replace("127.0.0.1:8420", host) for text in documented]
     monkeypatch.setenv("KINEME_STUDIO_TOKEN", served_letters.token)

@@ -144,7 +144,7 @@ def test_two_plain_words_choose_the_formulation_and_advanced_has_all(opened):
     with page.expect_request("**/api/primitive") as request:
         page.get_by_role("radio", name="Stretch").check()
     assert request.value.post_data_json["formulation"] == "amplitude-scaled"
-    assert page.inner_text("#move-legend").split() == ["recorded", "now"]
+    wait_until(page, "document.getElementById('move-legend').innerText.trim().split(/\\s+/).join() === 'recorded,now'")
     page.click("#move-advanced > summary")
     assert page.locator("#formulations input:checked").get_attribute("value") == "amplitude-scaled"
     page.locator("#formulations input").first.check()

@@ -14,7 +14,7 @@ import pytest
 from studio_samples import BEARER, Served, make_library, running, samples
 from websockets.sync.client import connect
 
-from kineme.studio.server import serve
+from kineme.studio.server import connections
 
 #: The command with few file descriptors, as where a user's limit is low.
 FEW = (
@@ -55,7 +55,7 @@ def test_hundreds_of_heads_that_never_end_lock_nobody_out_and_fill_no_log(folder
 
 @pytest.fixture
 def studio(folder, monkeypatch):
-    monkeypatch.setattr(serve, "HEAD_SECONDS", 0.2)
+    monkeypatch.setattr(connections, "HEAD_SECONDS", 0.2)
     served = Served(folder)
     yield served
     served.end()
@@ -92,13 +92,13 @@ def test_limits_follow_the_file_descriptors(monkeypatch):
     resource = pytest.importorskip("resource")
     for descriptors, most in ((16, 8), (96, 24), (1024, 256), (1 << 20, 512), (resource.RLIM_INFINITY, 512)):
         monkeypatch.setattr(resource, "getrlimit", lambda _, n=descriptors: (n, n))
-        assert serve.most_connections() == most
+        assert connections.most_connections() == most
 
 
 def test_the_same_error_is_logged_once_a_minute(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr(serve.time, "monotonic", lambda: now[0])
-    once = serve.OncePerInterval()
+    monkeypatch.setattr(connections.time, "monotonic", lambda: now[0])
+    once = connections.OncePerInterval()
 
     def logged(text):
         return once.filter(logging.LogRecord("asyncio", logging.ERROR, "", 0, text, (), None))

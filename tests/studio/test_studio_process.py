@@ -81,7 +81,9 @@ NODE = ["node", "--experimental-websocket"]  # node 20 has it under this option
 HAS_WEBSOCKET = shutil.which("node") is not None and (
     subprocess.run([*NODE, "-e", "WebSocket"], capture_output=True, check=False).returncode == 0
 )
-PROGRAMS = dict(re.findall(r"```(py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL))
+PROGRAMS = dict(
+    re.findall(r"```(py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio-network.md").read_text(), re.DOTALL)
+)
 
 
 @pytest.mark.parametrize("language", ["py", "js"])

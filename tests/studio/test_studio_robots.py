@@ -55,6 +55,8 @@ def test_an_arm_executes_a_symbol_with_its_checks_and_what_draws_it(client, symb
     scene = moved["scene"]
     assert len(scene["times"]) == len(scene["positions"]) == len(scene["executed"])
     assert "<robot" in scene["urdf"]
+    without = _move(client, symbol, shapes=False).json()["scene"]
+    assert without == {**scene, "urdf": "", "meshes": []}
 
 
 def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, symbol, arms):

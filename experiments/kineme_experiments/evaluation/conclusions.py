@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from statistics import fmean
 from typing import NamedTuple
 
+from kineme.reporting.text import counted
 from kineme_experiments.evaluation.conditions import Condition
 from kineme_experiments.evaluation.methods import METHODS, OURS
 from kineme_experiments.evaluation.protocols import PROTOCOLS
@@ -112,10 +114,15 @@ def _cell(ahead: list[Ahead]) -> str:
 
 
 def verdict(results: Results) -> str:
-    """What all tables say together."""
+    """Return what all tables say together, as one text."""
+    return " ".join(sentences(results))
+
+
+def sentences(results: Results) -> list[str]:
+    """Say in how many cells a rival is ahead, and then which rivals did not run, and where none took part."""
     protocols = [name for name, by_method in results.outcomes.items() if OURS in by_method and len(by_method) > 1]
     if not protocols:
-        return "Nothing is concluded about rivals: in no table did kineme and a rival take part together."
+        return ["Nothing is concluded about rivals: in no table did kineme and a rival take part together."]
     ahead = {(name, one.condition, one.measure) for name in protocols for one in cells_ahead(name, results)}
     n_cells = sum(_n_compared(name, results) for name in protocols)
     absent = {
@@ -134,7 +141,26 @@ def verdict(results: Results) -> str:
         parts.append(f"Not all rivals ran everywhere: {_with_reasons(absent)}.")
     if alone:
         parts.append(f"No rival took part in: {'; '.join(alone)}.")
-    return " ".join(parts)
+    return parts
+
+
+def best_rival(results: Results) -> str:
+    """Name the rival with the smallest mean lag, and both means over the cells that both have."""
+    pairs: dict[str, list[tuple[float, float]]] = {}
+    for protocol, by_method in results.outcomes.items():
+        for condition, measure in columns(protocol, results) if OURS in by_method else ():
+            ours = results.mean(protocol, OURS, condition, measure)
+            for rival in set(by_method) - {OURS}:
+                theirs = results.mean(protocol, rival, condition, measure)
+                if None not in (ours, theirs) and measure not in _NOT_RANKED:
+                    pairs.setdefault(METHODS[rival].title, []).append((ours, theirs))  # type: ignore[arg-type]
+    if not pairs:
+        return ""
+    means = {rival: tuple(map(fmean, zip(*both, strict=True))) for rival, both in pairs.items()}
+    rival = min(sorted(means), key=lambda name: means[name][0] - means[name][1])
+    ours, theirs = means[rival]
+    cells = counted(len(pairs[rival]), "cell")
+    return f"The best rival is {rival}: {theirs:.3f} on average over {cells}, where kineme has {ours:.3f}."
 
 
 def _n_compared(protocol: str, results: Results) -> int:

@@ -22,7 +22,7 @@ from kineme.reporting.figures import encode_figure, new_figure
 from kineme.reporting.page import page, picture
 from kineme.reporting.table import Table, mean_and_range, to_html
 from kineme.reporting.text import in_markup
-from kineme_experiments.evaluation.conclusions import MEASURES, columns, conclusion, verdict
+from kineme_experiments.evaluation.conclusions import MEASURES, best_rival, columns, conclusion, sentences
 from kineme_experiments.evaluation.conditions import Condition
 from kineme_experiments.evaluation.data import DataSet
 from kineme_experiments.evaluation.methods import METHODS, OURS
@@ -231,23 +231,31 @@ def write_report(
     data: DataSet, results: Results, tables: dict[str, Table], ranks: Ranks | str, facts: dict[str, Any]
 ) -> str:
     """HTML with tables and figures; `ranks` is a text that says why where there are none."""
-    parts = [f'<p class="lead">{in_markup(_lead(data))}</p>', f"<p>{in_markup(verdict(results))}</p>"]
+    drawings = {name: drawn for name in tables if (drawn := draw_protocol(name, results)) is not None}
+    pictures = {name: picture(drawn, f"{PROTOCOLS[name].title}: mean over splits.") for name, drawn in drawings.items()}
     if isinstance(ranks, str):
-        parts.append(f"<p>{in_markup(ranks)}</p>")
+        parts = [pictures.pop(next(iter(pictures), ""), ""), f"<p>{in_markup(ranks)}</p>"]
     else:
-        parts.append(picture(encode_figure(draw_ranks(ranks), "svg"), rank_sentence(ranks)))
+        parts = [picture(encode_figure(draw_ranks(ranks), "svg"), rank_sentence(ranks))]
+    parts.append(f'<p class="lead">{in_markup(_lead(data))}</p>')
     for name, table in tables.items():
-        drawn = draw_protocol(name, results)
-        shown = "" if drawn is None else picture(drawn, f"{PROTOCOLS[name].title}: mean over splits.")
+        shown = pictures.get(name, "")
         parts.append(f"<h2>{in_markup(PROTOCOLS[name].title)}</h2>{to_html(table)}{shown}")
     missing = {METHODS[name].title: why for name, why in results.absent.items()}
     missing |= {PROTOCOLS[name].title: why for name, why in results.skipped.items()} | data.left_out
     if missing:
         rows: list[tuple[str, ...]] = list(missing.items())
         parts.append(f"<h2>Left out</h2>{to_html(Table('Methods, protocols, files', ('what', 'why'), rows))}")
+    first, *others = sentences(results)
     versions = facts["versions"]
     listed = {key: value for key, value in facts.items() if key != "versions"} | versions
-    return page(f"kineme: evaluation on {data.name}", f"Recognition on {data.name}", "\n".join(parts), listed)
+    return page(
+        f"kineme: evaluation on {data.name}",
+        f"Recognition on {data.name}",
+        [first, best_rival(results), *others],
+        "\n".join(parts),
+        listed,
+    )
 
 
 def _lead(data: DataSet) -> str:

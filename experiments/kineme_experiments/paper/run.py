@@ -86,7 +86,7 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
     if "figure" in arm:
         figures = dict(sorted({**figures, "figure-07-arm": arm.pop("figure")}.items()))
     facts = {"draws": draws, "seed": seed, "quick": quick, "versions": _versions()}
-    files = [*_write_figures(out, figures), *_write_tables(out, by_data, figures, facts)]
+    files = [*_write_figures(out, figures), *_write_tables(out, by_data, figures, by_draw["paper"], facts)]
     seconds = round(time.perf_counter() - started, 2)
     numbers = {
         "format": _FORMAT,
@@ -156,11 +156,13 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
 
 
 def _write_tables(
-    out: Path, tables: dict[str, list[Table]], figures: dict[str, Any], facts: dict[str, Any]
+    out: Path, tables: dict[str, list[Table]], figures: dict[str, Any], draws: Draws, facts: dict[str, Any]
 ) -> list[Path]:
     from kineme.reporting.table import to_text
 
-    html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
+    html = write_report(
+        tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, draws, facts
+    )
     text = "\n\n".join(to_text(table) for some in tables.values() for table in some) + "\n"
     return [write_atomically(out / "report.html", html.encode()), write_atomically(out / "tables.txt", text.encode())]
 
@@ -319,8 +321,10 @@ def read_svm(on_arm: Draws) -> str:
     return " ".join(sentences)
 
 
-def write_report(tables: dict[str, list[Table]], figures: dict[str, tuple[str, bytes]], facts: dict[str, Any]) -> str:
-    """HTML with tables and figures.
+def write_report(
+    tables: dict[str, list[Table]], figures: dict[str, tuple[str, bytes]], draws: Draws, facts: dict[str, Any]
+) -> str:
+    """Return HTML that opens with a verdict and a picture of it, then has tables and figures.
 
     Parameters
     ----------
@@ -328,20 +332,26 @@ def write_report(tables: dict[str, list[Table]], figures: dict[str, tuple[str, b
         Heading -> the tables below it.
     figures : dict
         File name -> (caption, SVG).
+    draws : list of dict
+        Of the paper's nine letters.
     facts : dict
         Settings and versions, printed at the end.
     """
+    from kineme.reporting.figures import encode_figure
+    from kineme_experiments.paper.overview import CAPTION, draw_overview, verdict
+
     pictures = "\n".join(
         picture(svg, caption, f"Figure {int(name.split('-')[1])}. ") for name, (caption, svg) in figures.items()
     )
     parts = "\n".join(
         f"<h2>{in_markup(heading)}</h2>\n{''.join(map(to_html, some))}" for heading, some in tables.items()
     )
-    body = f"""<p class="lead">The tables and figures of D. Escudero-Rodrigo and R. Alquézar, recomputed on the LASA
+    body = f"""{picture(encode_figure(draw_overview(draws), "svg"), CAPTION)}
+<p class="lead">The tables and figures of D. Escudero-Rodrigo and R. Alquézar, recomputed on the LASA
 handwriting recordings of S. M. Khansari-Zadeh and A. Billard. Each accuracy is the mean over random draws of three
 demonstrations per shape, with its range; the paper prints one number.</p>
 {parts}
 <h2>Figures</h2>
 {pictures}"""
     heading = "Distance-based kernels for DMPs, reproduced"
-    return page(f"kineme: {heading}", heading, body, facts)
+    return page(f"kineme: {heading}", heading, verdict(draws), body, facts)

@@ -175,7 +175,7 @@ def diagnosis(draws: Draws) -> Table:
     )
 
 
-def _conventions(draws: Draws, kind: str, column: tuple[str, str], suffix: str = "") -> dict[str, list[float]]:
+def conventions(draws: Draws, kind: str, column: tuple[str, str], suffix: str = "") -> dict[str, list[float]]:
     """Feature -> accuracies, of all conventions that a column of the paper can mean."""
     return {
         row.formula: over(draws, kind, row.key + suffix)
@@ -187,7 +187,7 @@ def _conventions(draws: Draws, kind: str, column: tuple[str, str], suffix: str =
 def read_diagnosis(draws: Draws) -> str:
     """The conventions with the paper's accuracies, the cost of the division, and the features without errors."""
     accuracies = [
-        Printed(head, paper.NEAREST_NEIGHBOR[cell], _conventions(draws, "nearest", cell))
+        Printed(head, paper.NEAREST_NEIGHBOR[cell], conventions(draws, "nearest", cell))
         for head, cell in zip(COLUMNS, paper.CELLS, strict=True)
     ]
     sentences = [read_conventions(accuracies)]
@@ -220,7 +220,7 @@ def svm_diagnosis(draws: Draws) -> Table:
         for row in REPRESENTATIONS.values()
     ]
     accuracies = [
-        Printed(f"{kernel}, {head}", PRINTED[name][cell], _conventions(draws, "svm", cell, f"/{name}/paper"))
+        Printed(f"{kernel}, {head}", PRINTED[name][cell], conventions(draws, "svm", cell, f"/{name}/paper"))
         for name, kernel in KERNELS.items()
         for head, cell in zip(COLUMNS, paper.CELLS, strict=True)
     ]

@@ -12,7 +12,6 @@ from kineme.audit.motion import motion_of
 from kineme.audit.report import checks_table, findings_table, reasons_of, verdict
 from kineme.audit.run import KINDS, Audit, Finding
 from kineme.movements.episodes import Episode
-from kineme.reporting.colors import BLUE, GRAY, ORANGE, PURPLE
 from kineme.reporting.page import page
 from kineme.reporting.table import Table
 from kineme.reporting.text import in_markup
@@ -26,9 +25,12 @@ _WIDTH, _HEIGHT, _STRIP = 1040, 220, 110  # pixels
 _LEFT, _RIGHT, _ABOVE, _BELOW = 44, 12, 8, 24
 _BINS = 240  # pairs of extremes of a line
 _LINES = 16  # of a strip
-_COLORS = {"contradiction": PURPLE, "outlying": ORANGE, "unusual": BLUE, "ranked": BLUE}
+#: Of the style of the page, which has others in the dark.
+_COLORS = {
+    "contradiction": "var(--purple)", "outlying": "var(--orange)", "unusual": "var(--blue)", "ranked": "var(--blue)",
+}  # fmt: skip
 _NARROWEST = 4  # pixels of a stretch
-_SMALL = 'font-size="12" fill="#444"'
+_SMALL = 'font-size="12" fill="var(--soft)"'
 
 
 def audit_page(audit: Audit, name: str, episodes: Iterable[Episode], facts: Mapping[str, Any]) -> str:
@@ -40,7 +42,7 @@ def audit_page(audit: Audit, name: str, episodes: Iterable[Episode], facts: Mapp
     strips = {
         episode.number: _strip(episode, findings[episode.number]) for episode in episodes if episode.number in findings
     }
-    parts = [f'<p class="lead">{in_markup(verdict(audit))}</p>', _picture(audit)]
+    parts = [_picture(audit)]
     if audit.of_the_set:
         notes = "".join(f"<li>{in_markup(note)}</li>" for note in audit.of_the_set)
         parts.append(f"<h2>Of the whole set</h2><ul>{notes}</ul>")
@@ -62,7 +64,7 @@ def audit_page(audit: Audit, name: str, episodes: Iterable[Episode], facts: Mapp
         parts.append(_table("And these", findings_table(others, 1)))
     if (more := len(audit.findings) - DRAWN - _LISTED) > 0:
         parts.append(f"<p>and {more:,} more, which the table of --train-mask and --json list.</p>")
-    return page(f"kineme: audit of {name}", f"Audit of {name}", "\n".join(parts), dict(facts))
+    return page(f"kineme: audit of {name}", f"Audit of {name}", [verdict(audit)], "\n".join(parts), dict(facts))
 
 
 def drawn_episodes(audit: Audit) -> frozenset[int]:
@@ -102,12 +104,12 @@ def _picture(audit: Audit) -> str:
     for share in (0.5, 0.05, 1e-3, 1e-6, 1e-12):
         if (level := np.log1p(-np.log(share))) < top:
             at = _ABOVE + (_HEIGHT - _ABOVE - _BELOW) * (1 - level / top)
-            parts.append(f'<path d="M{_LEFT} {at:.0f}H{_WIDTH - _RIGHT}" stroke="#ddd"/>')
+            parts.append(f'<path d="M{_LEFT} {at:.0f}H{_WIDTH - _RIGHT}" stroke="var(--line)"/>')
             parts.append(f'<text x="{_LEFT - 4}" y="{at + 4:.0f}" text-anchor="end" {_SMALL}>{share:g}</text>')
     for at in np.argsort(audit.flagged[chosen], kind="stable"):
         k = int(chosen[at])
         number = int(audit.numbers[k])
-        color = _COLORS[kinds[number]] if audit.flagged[k] and number in kinds else "#bbb"
+        color = _COLORS[kinds[number]] if audit.flagged[k] and number in kinds else "var(--dot)"
         dot = f'<circle cx="{x[k]:.1f}" cy="{y[k]:.1f}" r="{4 if audit.flagged[k] else 2}" fill="{color}"/>'
         parts.append(f"<g><title>episode {number}</title>{dot}</g>" if audit.flagged[k] else dot)
     parts.append(f'<text x="{_LEFT}" y="{_HEIGHT - 6}" {_SMALL}>episode {audit.numbers[0]}</text>')
@@ -131,7 +133,9 @@ def _strip(episode: Episode, finding: Finding) -> str:
     seconds = max(float(motion.times[-1]), 1e-9)
     width, height = _WIDTH - _LEFT - _RIGHT, _STRIP - _ABOVE - _BELOW
     color = _COLORS[finding.kind]
-    parts = [f'<rect x="{_LEFT}" y="{_ABOVE}" width="{width}" height="{height}" fill="#fafafa" stroke="#ddd"/>']
+    parts = [
+        f'<rect x="{_LEFT}" y="{_ABOVE}" width="{width}" height="{height}" fill="var(--raised)" stroke="var(--line)"/>'
+    ]
     for reason in finding.reasons:
         if 0 < reason.end - reason.start < 0.98 * seconds or reason.end == reason.start > 0:
             wide = max(_NARROWEST, width * (reason.end - reason.start) / seconds)
@@ -145,7 +149,7 @@ def _strip(episode: Episode, finding: Finding) -> str:
     for k in [*others, *guilty[::-1]]:
         line = _line(motion.times / seconds, motion.state[:, k])
         points = " ".join(f"{_LEFT + width * a:.0f},{_ABOVE + height * (1 - b):.1f}" for a, b in line.tolist())
-        look = f'stroke="{color}" stroke-width="1.6"' if k in guilty else f'stroke="{GRAY}" stroke-width=".7"'
+        look = f'stroke="{color}" stroke-width="1.6"' if k in guilty else 'stroke="var(--gray)" stroke-width=".7"'
         parts.append(
             f'<polyline points="{points}" fill="none" {look}><title>{in_markup(motion.names[k])}</title></polyline>'
         )
@@ -155,9 +159,7 @@ def _strip(episode: Episode, finding: Finding) -> str:
     ]
     if guilty:
         name = in_markup(motion.names[guilty[0]])
-        parts.append(
-            f'<text x="{_WIDTH / 2}" y="{_STRIP - 8}" text-anchor="middle" font-size="12" fill="{color}">{name}</text>'
-        )
+        parts.append(f'<text x="{_WIDTH / 2}" y="{_STRIP - 8}" text-anchor="middle" {_SMALL}>{name}</text>')
     return _svg(_STRIP, f"the channels of episode {episode.number} over {seconds:.1f} s", parts)
 
 

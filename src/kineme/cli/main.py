@@ -25,6 +25,7 @@ from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
+from kineme.cli.listen import listen, ros
 from kineme.cli.move import move
 from kineme.cli.operators import operators
 from kineme.cli.output import write
@@ -96,6 +97,7 @@ def main() -> None:
 
 for command in (
     anchor, annotate, audit, correct, discover, evaluate, execute, export, features, find, gather, generate, move,
-    inspect, learn, library, operators, page, plan, recognize, reproduce, segment, serve, skills, studio, why,
+    inspect, learn, library, listen, operators, page, plan, recognize, reproduce, ros, segment, serve, skills, studio,
+    why,
 ):  # fmt: skip
     main.add_command(command)

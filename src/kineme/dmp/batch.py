@@ -18,6 +18,9 @@ from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Names, axis_names
+from kineme.reporting.page import thumbnail
+from kineme.reporting.table import Table, to_html
+from kineme.reporting.text import counted
 from kineme.validation import as_path
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
@@ -28,6 +31,8 @@ _STEPS_OF = {"step_values": "values", "step_shares": "shares", "step_offsets": "
 
 #: What a header that does not fit may raise.
 _UNFIT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
+
+_LISTED, _DRAWN = 20, 64  # movements that a notebook shows, and their samples
 
 _LABEL_TYPES = (str, int, float, bool)
 
@@ -75,6 +80,28 @@ class Batch:
     def __repr__(self) -> str:
         labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
         return f"{type(self).__name__}({len(self)} movements, {self.n_dims} dims{labels}, {self.dmp})"
+
+    def rollout(self, *args: Any, **options: Any) -> Any:
+        """Return the movements, see the subclass."""
+        raise NotImplementedError
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the movements as they were learned, see `Demonstrations.plot`; with `ax`, into these axes."""
+        return self.rollout().plot(ax)
+
+    def _repr_html_(self) -> str:
+        """Show the first 20 movements in a notebook; names are escaped."""
+        shown = self[:_LISTED].rollout(n_samples=_DRAWN)
+        labels = [""] * len(shown) if shown.labels is None else shown.labels.tolist()
+        names, durations = self.names or [None] * len(self), shown.times[:, -1].tolist()
+        rows = [
+            (str(label), name or "", f"{duration:.3g}")
+            for label, name, duration in zip(labels, names[:_LISTED], durations, strict=True)
+        ]
+        more = f"The first {_LISTED} of {len(self):,} movements." if len(self) > _LISTED else ""
+        pictures = [thumbnail(path) for path in np.asarray(shown.positions)]
+        title = f"{type(self).__name__}: {counted(len(self), 'movement')}, {counted(self.n_dims, 'dimension')}"
+        return to_html(Table(title, ("label", "name", "duration [s]"), rows, more, pictures))
 
     @property
     def n_dims(self) -> int:

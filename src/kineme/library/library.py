@@ -19,6 +19,8 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
 from kineme.movements.trajectories.trajectory import MovementsLike
+from kineme.reporting.page import thumbnail
+from kineme.reporting.table import Table, to_html
 
 if TYPE_CHECKING:
     from kineme.anchoring.proposals import Proposal
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
     from kineme.recognition.early.stream import Live
     from kineme.recognition.monitor import Monitor
     from kineme.recognition.recognizer import Recognizer
+
+_LISTED = 20  # symbols that a notebook shows
 
 
 def _blaming(cls: type[ActionLibrary]) -> type[ActionLibrary]:
@@ -158,6 +162,17 @@ class ActionLibrary:
             f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{self.store.counts.symbols} symbols, "
             f"version {self.version})"
         )
+
+    def _repr_html_(self) -> str:
+        """Show the first 20 symbols in a notebook, each with its prototype or its first movement; names are escaped."""
+        named = self.symbols()
+        shown = named[:_LISTED]
+        ids = [int(symbol.members[0]) if symbol.prototype is None else symbol.prototype for symbol in shown]
+        movements = self.movements(ids=ids) if ids else ()
+        rows = [(symbol.name, f"{len(symbol):,}", symbol.description) for symbol in shown]
+        more = f"The first {_LISTED} of {len(named):,} symbols." if named[_LISTED:] else ""
+        pictures = [thumbnail(movement.positions) for movement in movements]
+        return to_html(Table(repr(self), ("symbol", "movements", "description"), rows, more, pictures))
 
     @property
     def folder(self) -> Path | Address:

@@ -16,7 +16,7 @@ from kineme.errors import SpecificationError, TrajectoryError, heard_warnings
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.figure import set_equal_scales
-from kineme.planning.skill import Excess, Skill, move_to, outside
+from kineme.planning.skill import Excess, Skill, move_to, outside, skill_of
 from kineme.reporting.colors import BLUE, GRAY, ORANGE
 from kineme.reporting.figures import encode_figure, new_figure
 from kineme.reporting.text import drawable, printable, shortened
@@ -194,6 +194,24 @@ def preview_skill(  # noqa: PLR0913, PLR0917 - all that a movement depends on
     names = list(skill.axes) if generated.channels is None else list(recorded_names(generated.channels))
     path = generated.recorded[:, [names.index(axis) for axis in skill.axes]]
     return Preview(skill, robot, generated.times - generated.times[0], path, movement, refusal, tuple(heard))
+
+
+def plan_symbol(library: ActionLibrary, robot: Robot, who: str, joints: Array) -> RobotMovement:
+    """Return a checked movement of a symbol as it was demonstrated, where the arm, which stands with `joints`, is next.
+
+    Raises
+    ------
+    TrajectoryError
+        The arm cannot execute it.
+    """
+    skill = skill_of(library, who)
+    here = standing_place(library, skill, robot, joints)
+    row = 0 if here is None else int(np.linalg.norm(skill.starts - here, axis=1).argmin())
+    start, goal, duration = skill.starts[row], skill.goals[row], float(skill.durations[row])
+    shown = preview_skill(library, skill, robot, joints, start, goal, duration)
+    if shown.movement is None:
+        raise TrajectoryError(shown.refusal)
+    return shown.movement
 
 
 def draw_preview(shown: Preview) -> bytes:

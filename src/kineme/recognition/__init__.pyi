@@ -9,6 +9,10 @@ from kineme.recognition.monitor import Corridor as Corridor
 from kineme.recognition.monitor import Execution as Execution
 from kineme.recognition.monitor import Monitor as Monitor
 from kineme.recognition.monitor import MonitorState as MonitorState
+from kineme.recognition.differences import Confusion as Confusion
+from kineme.recognition.differences import compare as compare
+from kineme.recognition.differences import confusion as confusion
+from kineme.recognition.explanation import Explanation as Explanation
 from kineme.recognition.outliers import Outlier as Outlier
 from kineme.recognition.outliers import Outliers as Outliers
 

@@ -20,6 +20,7 @@ from kineme.recognition import explanation
 from kineme.recognition.classifiers import NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.recognition.convolutions import Convolutions
+from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison, fit_to_references
@@ -251,9 +252,17 @@ class Answer:
         return draw_answer(shares, Example(self.nearest[0].index, shown, self.transform), movement, demonstrations)
 
     def _repr_html_(self) -> str:
-        """Show the first ten classes in a notebook; names are escaped."""
-        rows = [(str(label), f"{self.probabilities[label]:.2f}") for label in self.ranked[:_LISTED]]
-        return to_html(Table(self.in_words, ("class", "probability, if it is known"), rows, self.promise))
+        """Show the movement, its nearest examples and the first ten classes in a notebook; names are escaped."""
+        shown = self.ranked[:_LISTED]
+        rows = [(str(label), f"{self.probabilities[label]:.2f}") for label in shown]
+        pictures = []
+        if self._rests_on is not None:
+            _, references, movement, examples, _ = self._rests_on
+            nearest = references[np.array([index for _, index, _ in examples], dtype=np.intp)]
+            drawn = {label: thumbnail(stored.positions) for (label, *_), stored in zip(examples, nearest, strict=True)}
+            pictures = [thumbnail(movement.positions), *(drawn.get(label, "") for label in shown)]
+            rows.insert(0, ("the movement", ""))
+        return to_html(Table(self.in_words, ("class", "probability, if it is known"), rows, self.promise, pictures))
 
     def __repr__(self) -> str:
         sure = f"confidence={self.confidence:.3g}, rule={self.rule!r}, calibrated={self.calibrated}"

@@ -18,6 +18,7 @@ from kineme.movements.trajectories.movements import Samples
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.reporting.colors import BLUE, GRAY
 from kineme.reporting.figures import figure_to_show, principal_axes
+from kineme.reporting.table import wrapped
 from kineme.reporting.text import drawable, shortened
 from kineme.validation import Array
 
@@ -149,7 +150,8 @@ def draw_explanation(
         panels[0, 0].plot([], [], "o", color=BLUE, markersize=5, label="start of the movement")
         figure.legend(loc="outside lower center", ncols=2)
         figure.colorbar(colored, ax=panels, label="distance from it, in sizes of the movement", shrink=0.8)
-        figure.suptitle("\n".join(drawable(shortened(line, 80)) for line in title))
+        lines = [part for line in title for part in wrapped(shortened(line, 160), 42 * len(overlays))]
+        figure.suptitle("\n".join(map(drawable, lines)))
     return figure
 
 

@@ -166,7 +166,7 @@ class Explanation:
         overlays = {"nearest": self.nearest, "next in rank": self.runner_up}
         panels = [
             Panel(
-                f"{role}: {overlay.label}, {overlay.similarity:.2f} alike",
+                f"{f'{role}: ' * (self.runner_up is not None)}{overlay.label}, {overlay.similarity:.2f} alike",
                 overlay.path,
                 by_part(self.path, overlay.path, self.parts),
             )
@@ -175,6 +175,12 @@ class Explanation:
         ]
         title = [self.answer, *[_CONVOLUTIONS] * self.by_convolutions]
         return draw_explanation(title, self.path, self.columns, self.parts, panels)
+
+    def _repr_html_(self) -> str:
+        """Show the figure in a notebook, and say the same in words."""
+        from kineme.reporting.page import inline
+
+        return inline(self.plot(), self.in_words)
 
 
 class Rationale(NamedTuple):

@@ -19,6 +19,8 @@ from kineme.recognition.answer import Answer, is_one, known_classes
 from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_best
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.recognition.convolutions import Convolutions
+from kineme.reporting.table import to_html
+from kineme.reporting.text import in_markup
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
 from kineme.similarity.describe import Described, Tile
@@ -189,6 +191,16 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self._calibration: Calibration | None = None  # these two are made when first asked for
         self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self
+
+    def _repr_html_(self) -> str:
+        """Show a picture and a row for each class in a notebook; before it is fitted, its parameters."""
+        if not hasattr(self, "references_"):
+            return f"<pre>{in_markup(repr(self))}</pre>"
+        return to_html(self.demonstrations_.by_label(repr(self)))
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        """Show the classes where scikit-learn would show a diagram of one box."""
+        return {"text/plain": repr(self), "text/html": self._repr_html_()}
 
     @property
     def classes_(self) -> NDArray[Any]:

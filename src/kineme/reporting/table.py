@@ -21,12 +21,16 @@ _NARROW = 12  # columns below which no word is shortened
 
 
 class Table(NamedTuple):
-    """A title, column heads, rows of text with the row's name first, and the text below the table."""
+    """A title, column heads, rows of text with the row's name first, and the text below the table.
+
+    `pictures` are markup, of `thumbnail` or empty, that stands before the first rows in HTML.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     reading: str = ""
+    pictures: Sequence[str] = ()
 
 
 def mean_and_range(values: Sequence[float]) -> str:
@@ -106,10 +110,13 @@ def _as_lists(lines: Sequence[tuple[str, ...]], width: int) -> list[str]:
 
 def to_html(table: Table) -> str:
     """A table element with caption."""
-    head = "".join(f'<th scope="col">{in_markup(cell)}</th>' for cell in table.columns)
+    head = "<td></td>" * bool(table.pictures)
+    head += "".join(f'<th scope="col">{in_markup(cell)}</th>' for cell in table.columns)
     cells = ["".join(f"<td>{in_markup(cell)}</td>" for cell in row[1:]) for row in table.rows]
-    rows = zip(table.rows, cells, strict=True)
-    body = "".join(f'<tr><th scope="row">{in_markup(row[0])}</th>{others}</tr>' for row, others in rows)
+    before = [f"<td>{drawing}</td>" for drawing in table.pictures]
+    before += ["<td></td>" * bool(before)] * (len(table.rows) - len(before))
+    rows = zip(before, table.rows, cells, strict=True)
+    body = "".join(f'<tr>{first}<th scope="row">{in_markup(row[0])}</th>{others}</tr>' for first, row, others in rows)
     reading = f"<p>{in_markup(table.reading)}</p>" if table.reading else ""
     return (
         f"<figure><table><caption>{in_markup(table.title)}</caption><thead><tr>{head}</tr></thead>"

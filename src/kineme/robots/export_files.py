@@ -33,7 +33,7 @@ TRAJECTORY, STATE = "trajectory_msgs/msg/JointTrajectory", "sensor_msgs/msg/Join
 _SECOND = 1_000_000_000  # [ns]
 
 
-def _stamp(time: float) -> dict[str, int]:
+def stamp_of(time: float) -> dict[str, int]:
     """A time [s] as ROS divides it."""
     seconds, nanoseconds = divmod(_nanoseconds(time), _SECOND)
     return {"sec": seconds, "nanosec": nanoseconds}
@@ -104,7 +104,7 @@ def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool
 
     def header(time: float) -> Any:
         counted = {"seq": 0} if is_ros1 else {}  # ROS 1 counts messages
-        stamp = types["builtin_interfaces/msg/Time"](**_stamp(time))
+        stamp = types["builtin_interfaces/msg/Time"](**stamp_of(time))
         return types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **counted)
 
     points = [
@@ -113,9 +113,9 @@ def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool
             velocities=velocities,
             accelerations=accelerations,
             effort=np.zeros(0),
-            time_from_start=types["builtin_interfaces/msg/Duration"](**_stamp(time)),
+            time_from_start=types["builtin_interfaces/msg/Duration"](**stamp_of(time)),
         )
-        for time, positions, velocities, accelerations in _samples(trajectory)
+        for time, positions, velocities, accelerations in samples_of(trajectory)
     ]
     message = types[TRAJECTORY](header=header(0.0), joint_names=list(trajectory.joints), points=points)
     writer.write(wanted, 0, serialize(message, TRAJECTORY))
@@ -127,7 +127,7 @@ def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool
         writer.write(states, _nanoseconds(time), serialize(state, STATE))
 
 
-def _samples(trajectory: JointTrajectory) -> Iterator[tuple[Any, ...]]:
+def samples_of(trajectory: JointTrajectory) -> Iterator[tuple[Any, ...]]:
     """Time, positions, velocities and accelerations of each sample."""
     return zip(trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
 
@@ -153,9 +153,9 @@ def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
             "positions": positions.tolist(),
             "velocities": velocities.tolist(),
             "accelerations": accelerations.tolist(),
-            "time_from_start": _stamp(time),
+            "time_from_start": stamp_of(time),
         }
-        for time, positions, velocities, accelerations in _samples(trajectory)
+        for time, positions, velocities, accelerations in samples_of(trajectory)
     ]
     points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(rows))  # there are no texts in them but their keys
     text = f'{{"trajectory": {{"joint_names": {json.dumps(trajectory.joints)}, "points": {points}}}}}\n'

@@ -341,12 +341,14 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
     return snapshot
 
 
-def snapshot_of_recognizer(recognizer: FittedRecognizer, dmp: DMP | None = None) -> Snapshot:
-    """A fitted recognizer, with a primitive of the medoid of each class."""
+def snapshot_of_recognizer(
+    recognizer: FittedRecognizer, dmp: DMP | None = None, early: Early | None = None
+) -> Snapshot:
+    """A fitted recognizer, with a primitive of the medoid of each class; `early` as in `snapshot_of_library`."""
     classes = known_classes(recognizer)
     demos = classes.references.all_movements()
     medoids = fit_prototype(classes.comparison, classes.references).medoids
-    return _snapshot(classes, (dmp or DMP()).learn(demos[medoids]))
+    return _snapshot(classes, (dmp or DMP()).learn(demos[medoids]), early)
 
 
 def some_members(members: Members, most: int) -> Members:

@@ -40,7 +40,7 @@ def test_paths_over_length_are_smoothed_first_so_that_noise_adds_no_length(lette
 
 
 def test_who_compares_over_length(letters):
-    """Rivals are given the positions in which they do best, and DTW both; docs/guide/recognition.md says so."""
+    """Rivals are given the positions in which they do best, and DTW both, as recognition-beside-others.md says."""
     warped = Perturbation(warp=0.5).apply(letters, 0)
 
     def moved(contender):

@@ -7,7 +7,7 @@ import pytest
 
 import kineme
 from kineme_experiments.evaluation import methods
-from kineme_experiments.evaluation.conclusions import conclusion, verdict
+from kineme_experiments.evaluation.conclusions import best_rival, conclusion, verdict
 from kineme_experiments.evaluation.conditions import UNTOUCHED
 from kineme_experiments.evaluation.data import DataSet
 from kineme_experiments.evaluation.methods import METHODS
@@ -76,6 +76,7 @@ def test_the_page_needs_no_other_file_and_escapes_names(done):
     assert "<numbers>" not in html
     assert "expected &lt;numbers&gt;" in html
     assert html.count("<img") == 3  # mean ranks, few shots and robustness
+    assert html.index('class="verdict"') < html.index("<img") < html.index("<table>")
     for name in PLAN[0]:
         assert PROTOCOLS[name].title in html
     for name in PLAN[1]:
@@ -139,6 +140,13 @@ def test_a_rival_that_is_ahead_is_named():
     del found.outcomes["few-shot"]["kineme"]
     assert conclusion("few-shot", found) == ""
     assert "Nothing is concluded" in verdict(found)
+
+
+def test_the_best_rival_is_that_with_the_smallest_lag_over_the_cells_that_both_have():
+    assert best_rival(outcome(kineme=0.9, dtw=0.7, hmm=0.8)) == (
+        "The best rival is HMM: 0.800 on average over 1 cell, where kineme has 0.900."
+    )
+    assert best_rival(Results({"few-shot": {}}, {}, {}, {})) == ""
 
 
 def test_that_no_rival_is_ahead_is_said_only_if_all_ran():

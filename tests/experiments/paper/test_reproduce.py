@@ -22,6 +22,7 @@ from click.testing import CliRunner
 from kineme.cli import main
 from kineme.reporting.table import mean_and_range, to_text
 from kineme_experiments.paper import paper
+from kineme_experiments.paper.overview import accuracies, verdict
 from kineme_experiments.paper.representations import READINGS, REPRESENTATIONS
 from kineme_experiments.paper.run import Reproduction, _tasks, arm_tables
 from kineme_experiments.paper.tables import make_tables
@@ -89,9 +90,29 @@ def test_it_draws_eleven_figures_as_png_and_svg(run):
 
 def test_the_report_is_one_self_contained_file(run):
     html = (run[1] / "report.html").read_text(encoding="utf-8")
-    assert html.count("<img") == 11 + ARM
+    assert html.count("<img") == 1 + 11 + ARM
     assert html.count("<table>") >= 7
     assert not re.search(r'(src|href)="(?!data:)', html)
+
+
+def test_the_report_opens_with_a_verdict_and_a_picture(run, default_draws):
+    html = (run[1] / "report.html").read_text(encoding="utf-8")
+    assert html.index('class="verdict"') < html.index("<img") < html.index("<table>")
+    assert not re.search(r"\bfilter:", html.partition("</style>")[0])
+    draws = default_draws["paper"]
+    held, *others = verdict(draws)
+    compared = accuracies(draws)
+    within = [
+        any(min(values) - 1e-3 <= one.printed <= max(values) + 1e-3 for values in one.conventions.values())
+        for one in compared
+    ]
+    assert 0 < sum(within) < len(within) == 12
+    assert held.startswith(f"{sum(within)} of the paper's 12 accuracies")
+    by_name = {one.name: np.mean(one.default) for one in compared}
+    for name, sentence in zip(("original", "bio-inspired"), others, strict=False):
+        shape, weights = by_name[f"1-NN: f(t), {name}"], by_name[f"1-NN: weights, {name}"]
+        assert f"{shape:.3f} against {weights:.3f}" in sentence
+        assert ("better than" in sentence) == (f"{shape:.3f}" > f"{weights:.3f}")
 
 
 def _close(value):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import unit_of
 from kineme.movements.trajectories.movements import Samples
+from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, data_frame, to_html
 
 if TYPE_CHECKING:
@@ -88,19 +89,25 @@ class Presented:
         return ax
 
     def _repr_html_(self) -> str:
-        """Show a row for each label in a notebook; names from files are escaped."""
+        """Show a picture and a row for each label in a notebook; names from files are escaped."""
+        return to_html(self.by_label(repr(self)))
+
+    def by_label(self, title: str) -> Table:
+        """Return a table with a row for each of the first 20 labels, and a picture of its first movement."""
         samples = self._samples
         lengths = np.diff(samples.offsets)
         durations = samples.times[samples.offsets[1:] - 1] - samples.times[samples.offsets[:-1]]
-        names, of_label = [""], np.zeros(len(lengths), dtype=np.intp)
-        if samples.labels is not None:
-            names, of_label = np.unique(samples.labels, return_inverse=True)  # type: ignore[assignment]
+        labels = np.full(len(lengths), "") if samples.labels is None else samples.labels
+        names, first, of_label = np.unique(labels, return_index=True, return_inverse=True)
         rows = [
             (str(name), f"{mine.sum():,}", _range(lengths[mine], ","), _range(durations[mine], ".3g"))
             for name, mine in ((name, of_label == k) for k, name in enumerate(names[:_LISTED]))
         ]
+        pictures = [
+            thumbnail(samples.positions[samples.offsets[i] : samples.offsets[i + 1]]) for i in first[:_LISTED].tolist()
+        ]
         more = f"The first {_LISTED} of {len(names):,} labels." if len(names) > _LISTED else ""
-        return to_html(Table(repr(self), ("label", "movements", "samples each", "duration [s]"), rows, more))
+        return Table(title, ("label", "movements", "samples each", "duration [s]"), rows, more, pictures)
 
 
 def with_units(names: tuple[str, ...], channels: Channels | None) -> tuple[str, ...]:

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.channel import Channels, learned_names, recorded_names
+from kineme.movements.trajectories.movements import Samples, axis_names
+from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.validation import Array, as_positions, as_times, check_extents, check_finite, check_times
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Presented):
     """One movement: positions over time, with an optional label and name.
 
     Parameters
@@ -81,6 +83,15 @@ class Trajectory:
     def n_dims(self) -> int:
         """Number of dimensions d."""
         return int(self.positions.shape[1])
+
+    @property
+    def _samples(self) -> Samples:
+        names = heads = tuple(axis_names(self.n_dims))
+        if self.channels is not None:
+            names = with_units(learned_names(self.channels), self.channels)
+            heads = with_units(recorded_names(self.channels), self.channels)
+        ends, labels = np.array([0, len(self)]), None if self.label is None else np.array([self.label], dtype=object)
+        return Samples(self.times, ends, self.positions, names, self.recorded, heads, labels)
 
     def __len__(self) -> int:
         return len(self.times)

@@ -109,15 +109,20 @@ class Live:
         with single_threaded_blas():  # held once, not for each of many small products
             return self._estimate(samples, status)
 
-    def finish(self) -> Answer:
+    def finish(self, until: float | None = None) -> Answer:
         """Return the answer of `Recognizer.recognize` to the whole movement.
+
+        Parameters
+        ----------
+        until : float, optional
+            Stamp after which samples do not count [s]: where a rest shows that the movement is over, its beginning.
 
         Raises
         ------
         TrajectoryError
             Fewer than four samples could be used.
         """
-        return self._recognize(self.movement())
+        return self._recognize(self.movement(until))
 
     def next(self) -> Answer:
         """Return the answer of `finish`, and begin the next movement by the same person.
@@ -132,17 +137,23 @@ class Live:
         TrajectoryError
             Fewer than four samples could be used. `reset` begins the next movement then.
         """
-        movement = self.movement()
-        answer = self._recognize(movement)
-        if answer.label is not None and answer.confidence >= self._decision.confidence:
-            label = self._classes.index(answer.label)
-            own = earlier(self._stored, self._comparison.checked([movement]), label)
-            self._earlier = remembered(self._earlier, own)
-            self._hypotheses = with_earlier(self._stored, self._earlier)
+        answer = self.finish()
+        self.remember(answer)
         self.reset()
         return answer
 
-    def movement(self) -> Trajectory:
+    def remember(self, answer: Answer, until: float | None = None) -> None:
+        """Remember the movement for the next ones by the same person, as `next` does; `reset` begins them.
+
+        `answer` and `until` are those of `finish`: who waits for the answer need not wait for this.
+        """
+        if answer.label is not None and answer.confidence >= self._decision.confidence:
+            label = self._classes.index(answer.label)
+            own = earlier(self._stored, self._comparison.checked([self.movement(until)]), label)
+            self._earlier = remembered(self._earlier, own)
+            self._hypotheses = with_earlier(self._stored, self._earlier)
+
+    def movement(self, until: float | None = None) -> Trajectory:
         """Return the movement so far, as `finish` recognizes it: without what was skipped, averaged after 4096 samples.
 
         Raises
@@ -151,6 +162,8 @@ class Live:
             Fewer than four samples could be used.
         """
         samples = self._path.kept()
+        if until is not None:
+            samples = samples[samples[:, 0] <= until]
         movement = Demonstrations([Trajectory(samples[:, 0].copy(), samples[:, 1:].copy())])
         if self.channels is not None and is_plain(self.channels):  # converted already, and averaged since
             movement = Demonstrations.of_movements(replace(movement.movements, channels=self.channels))

@@ -8,6 +8,7 @@ import { createMoving, placed } from "./movements.js";
 import { openSnapshot } from "./snapshot.js";
 import { boxOf, Stage } from "./stage.js";
 import { createSymbols } from "./symbols.js";
+import { hearNotebook, tell, tellDrawn } from "./telling.js";
 
 const STEP = 0.03; // of the stage, by an arrow key
 const DRAWN = "Your drawing";
@@ -94,7 +95,14 @@ function become(change) {
   following.reset();
   Object.assign(state, NOTHING, change);
   symbols.select(state.answer?.label ?? null);
+  tellMoved();
   show();
+}
+
+function tellMoved() {
+  if (!state.moving) return;
+  const { name, start, goal, via, times, positions } = state.moving;
+  tell({ moved: { name, start, goal, via, times: [...times], positions } });
 }
 
 /** A known movement, or a drawn one, that can be moved; the note says why there is none. */
@@ -121,6 +129,7 @@ function finish() {
   const drawn = state.stroke;
   const place = { start: drawn.positions[0], goal: drawn.positions.at(-1) };
   following.finish();
+  tellDrawn([null, drawn.times.map((time, i) => [time, ...drawn.positions[i]])]);
   try {
     const answer = backend.recognize(drawn);
     const { encodes } = header.movements;
@@ -140,6 +149,7 @@ const placeOf = (event) => {
 /** What moves is another; the note says why it cannot be so. @param {string} [note] */
 function moved(note = "") {
   stage.board.draw();
+  if (!state.held) tellMoved();
   if (note === state.note) return; // words stay while a hand moves
   state.note = note;
   show();
@@ -172,7 +182,7 @@ function hold(event) {
 /** @type {import("../web/parts/stroke.js").Hearer} */
 const hearer = {
   begins: () => {
-    if (state.held) return false;
+    if (state.held || !header.early) return false;
     become({ stroke: { times: [], positions: [] } });
     return true;
   },
@@ -258,8 +268,14 @@ function start() {
       for (const picture of [stage, symbols]) picture.turn(angles);
     });
   become({});
+  // Primitives alone recognize nothing; what moves there is where it was before the cell was shown again.
+  hearNotebook(({ moved: { name, ...place } }) => {
+    if (header.early || state.moving) return;
+    choose(name);
+    update(place);
+  });
   // What is drawn first should not wait for what is made once.
-  window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
+  if (header.early) window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
 }
 
 start();

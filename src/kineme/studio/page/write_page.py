@@ -19,34 +19,47 @@ _IMPORT = re.compile(r'^import \{([^}]*)\} from "(\.[^"]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
 _LEFT = re.compile(r"^(?:import|export)\b", re.MULTILINE)
 
-_FOLDER = Path(__file__).parent
-_TOKENS = _FOLDER.parent / "web" / "tokens.css"
+FOLDER = Path(__file__).parent
+_TOKENS = FOLDER.parent / "web" / "tokens.css"
 _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly along z
 
 
 def library_page(library: ActionLibrary, title: str, most: int | None = None) -> tuple[str, Snapshot]:
     """Make the text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`."""
-    if library.n_dims not in (2, 3) and len(library):
-        raise SpecificationError(
-            f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "
-            "be drawn; learn two or three columns of the recordings, in the shell with --columns"
-        )
+    if len(library):
+        check_drawable(library.n_dims)
     snapshot = snapshot_of_library(library, most, DRAWN)
     return page_of(snapshot, title), snapshot
 
 
-def page_of(snapshot: Snapshot, title: str) -> str:
-    """Make the page of a snapshot; its content security policy allows its own script and style by hashes, no more."""
+def check_drawable(n_dims: int | None) -> None:
+    """Check that movements are in the plane or in space."""
+    if n_dims not in (2, 3):
+        raise SpecificationError(
+            f"expected movements in the plane or in space, got {n_dims} dimensions, which cannot be drawn; learn two "
+            "or three columns of the recordings, in the shell with --columns"
+        )
+
+
+def page_of(snapshot: Snapshot, title: str, frame: str = "") -> str:
+    """Make the page of a snapshot, whose body is of the class `frame`, see `filled_page`."""
     snapshot.header["view"] = view_of(snapshot)
-    style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
     parts = {
         "title": in_markup(title),
         "summary": in_markup(summary_of(snapshot)),
         "footer": in_markup("Recognized and generated in this page by kineme; nothing leaves it."),
         "snapshot": snapshot.to_json(),
+        "frame": frame,
     }
-    template = (_FOLDER / "page.html").read_text(encoding="utf-8")
-    return filled(template, parts, style, {"script": bundled(_FOLDER / "face.js")})
+    return filled_page("page.html", "face.js", parts)
+
+
+def filled_page(template: str, script: str, parts: dict[str, str]) -> str:
+    """Fill a template; the policy of the page allows its own script and style by hashes, no more."""
+    styles = [_TOKENS, FOLDER / "page.css", *[FOLDER / "notebook.css"] * bool(parts["frame"])]
+    style = "".join(part.read_text(encoding="utf-8") for part in styles)
+    text = (FOLDER / template).read_text(encoding="utf-8")
+    return filled(text, parts, style, {"script": bundled(FOLDER / script)})
 
 
 def write_page(

@@ -52,7 +52,7 @@ class Guard:
         if refusal := self._refusal(scope, headers):
             await refuse(scope, guarded, *refusal)
         elif _is_page(scope) and not {"token", "once"}.isdisjoint(_query(scope)):
-            await self._set_cookie(guarded, headers)
+            await self._set_cookie(guarded, headers, scope["scheme"] == "https")
         else:
             await self.app(scope, receive, guarded)
 
@@ -93,8 +93,8 @@ class Guard:
             self._once = ""
         return used
 
-    async def _set_cookie(self, send: Send, headers: Mapping[str, str]) -> None:
-        cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+    async def _set_cookie(self, send: Send, headers: Mapping[str, str], encrypted: bool) -> None:
+        cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict" + "; Secure" * encrypted
         # Where a page of another site may have led a browser here, it follows a redirect without the cookie.
         site, is_page = headers.get("sec-fetch-site"), "text/html" in headers.get("accept", "")
         is_linked = is_page and site not in {"none", "same-origin"}

@@ -26,6 +26,7 @@ from kineme.studio.server import (
     recording_routes,
     robot_routes,
     rollout_routes,
+    wand,
 )
 from kineme.studio.server.access import Guard
 from kineme.studio.server.live_socket import Sources
@@ -109,6 +110,7 @@ ROUTERS = (
     episode_routes.router,
     robot_routes.router,
     live_socket.router,
+    wand.router,
 )
 
 
@@ -153,12 +155,13 @@ def create_app(
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
     changes = app.state.changes = Changes(app.state.studio)
-    app.state.sources = Sources()
+    app.state.sources, app.state.wand = Sources(), None
     app.state.studio.warm_up()
     watching = asyncio.create_task(changes.watch())
     try:
         yield
     finally:
+        wand.close_wand(app)
         watching.cancel()
         with suppress(asyncio.CancelledError):
             await watching

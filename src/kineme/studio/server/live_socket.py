@@ -36,7 +36,12 @@ router = APIRouter()
 
 _WAITING = 64  # messages of one client that wait; it is not read on before
 _PAUSE = 1 / 60  # seconds between what a client is told unasked; what comes meanwhile is told at once
-_WORDS = '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true}, {"name": "..."} or {"watch": true}'
+_WORDS = (
+    '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true}, {"hand": {"points": ...}}, '
+    '{"name": "..."} or {"watch": true}'
+)
+_LANDMARKS = 21  # of a hand, as MediaPipe numbers them
+_ASPECT = 4 / 3  # of the picture of a camera that does not say how wide it is
 
 
 @router.websocket("/api/live")
@@ -58,11 +63,12 @@ async def live(socket: WebSocket) -> None:
 
 
 class _Received(NamedTuple):
-    """A message of a client: samples, a command, its name, or what was wrong with it; `_END` at the end."""
+    """A message of a client: samples, a command, its name, a hand, or what was wrong with it; `_END` at the end."""
 
     samples: Array | None = None
     command: str | None = None
     name: str | None = None
+    hand: dict[str, Any] | None = None
     wrong: str | None = None
 
 
@@ -150,8 +156,8 @@ class _Client:
 
     async def _answer(self, received: _Received) -> dict[str, Any] | None:
         run = asyncio.get_running_loop().run_in_executor
-        samples, command, name, wrong = received
-        if self._source is None and self._follower is None and (samples is not None or name is not None):
+        samples, command, name, hand, wrong = received
+        if self._source is None and self._follower is None and any(part is not None for part in (samples, name, hand)):
             self._source = self._sources.add()  # a program, which the pages show
         source = self._source
         if samples is not None:
@@ -172,16 +178,21 @@ class _Client:
             if source is not None:
                 source.reset()
         elif command == "watch":  # a page: it shows the movements of programs, and others do not show its own
-            if self._follower is None:
-                self._follower = Follower(self._sources)
-                self._sources.listen(self._tell_soon)
-                self._tell_soon()
-            if source is not None:
-                self._sources.remove(source)
-                self._source = None
+            self._watch()
         elif name is not None and source is not None:
             source.rename(name)
+        elif hand is not None and source is not None:
+            source.show_hand(hand)
         return None if wrong is None else {"error": wrong}
+
+    def _watch(self) -> None:
+        if self._follower is None:
+            self._follower = Follower(self._sources)
+            self._sources.listen(self._tell_soon)
+            self._tell_soon()
+        if self._source is not None:
+            self._sources.remove(self._source)
+            self._source = None
 
     async def _send(self, message: dict[str, Any]) -> None:
         text = json.dumps(message, allow_nan=False, ensure_ascii=False)
@@ -196,10 +207,9 @@ def _parsed(message: Any) -> _Received:
         return _Received(wrong=f"expected JSON: {_WORDS}; got something else")
     content = content if isinstance(content, dict) else {}
     try:
-        if "samples" in content:
-            return _Received(samples=parsed_samples(content["samples"]))
-        if "name" in content:
-            return _Received(name=parsed_name(content["name"]))
+        for field, parse in _PARSED.items():
+            if field in content:
+                return _Received(**{field: parse(content[field])})
     except TrajectoryError as error:
         return _Received(wrong=str(error))
     for command in ("finish", "reset", "watch"):
@@ -324,6 +334,7 @@ class Source:
     def __init__(self, tell: Callable[[], object]) -> None:
         self.name, self._tell = UNNAMED, tell
         self.movement, self.changes = 0, 0
+        self.hand: dict[str, Any] | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -335,6 +346,11 @@ class Source:
     def rename(self, name: str) -> None:
         """Take another name."""
         self.name = name
+        self._changed()
+
+    def show_hand(self, hand: dict[str, Any]) -> None:
+        """Show a hand, which pages draw with."""
+        self.hand = hand
         self._changed()
 
     def update(self, rows: Array, state: dict[str, Any]) -> None:
@@ -397,12 +413,28 @@ class Follower:
             self._followed[key] = _FollowedSource(
                 source, source.movement, source.dropped + len(source.samples), source.changes
             )
-            told = {name: getattr(source, name) for name in ("name", "movement", "state", "ended")}
+            told = {name: getattr(source, name) for name in ("name", "movement", "state", "ended", "hand")}
             news.append({"id": key, **told, "samples": source.samples[first:]})
         for key in sorted(gone):  # after what they have sent last
             news.append({"id": key, "gone": True})
             del self._followed[key]
         return news
+
+
+def parsed_hand(given: Any) -> dict[str, Any]:
+    """Check landmarks (21, 2) or (21, 3), as fractions of a picture, their time [s], and its width by its height."""
+    hand = given if isinstance(given, dict) else {}
+    try:
+        points = parsed_samples(hand.get("points"))
+        ((time, aspect),) = parsed_samples([[hand.get("time"), hand.get("aspect", _ASPECT)]]).tolist()
+    except TrajectoryError:
+        points, time, aspect = np.empty(0), 0.0, 0.0
+    if points.shape not in {(_LANDMARKS, 2), (_LANDMARKS, 3)} or not aspect > 0:
+        raise TrajectoryError(
+            'expected {"hand": {"points": [[x, y], ...], "time": t, "aspect": width / height}} with 21 points as '
+            "fractions of the picture; got something else"
+        )
+    return {"points": points.tolist(), "time": time, "aspect": aspect}
 
 
 def parsed_name(given: Any) -> str:
@@ -411,3 +443,6 @@ def parsed_name(given: Any) -> str:
     if not 0 < len(name) <= LONGEST or any("\ud800" <= mark <= "\udfff" for mark in name):
         raise TrajectoryError(f"expected a name of 1 to {LONGEST} characters, got something else; send one")
     return name
+
+
+_PARSED: dict[str, Callable[[Any], Any]] = {"samples": parsed_samples, "name": parsed_name, "hand": parsed_hand}

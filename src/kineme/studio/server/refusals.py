@@ -82,8 +82,9 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
             '<meta name="viewport" content="width=device-width">'
             '<meta name="color-scheme" content="light dark"><title>kineme studio: not opened</title>'
             f"<h1>The studio was not opened</h1><p>It {in_markup(text.rstrip('.'))}.</p>"
-            "<p>The address stands in the terminal in which <code>kineme studio</code> was started; copy the whole of "
-            "it. The token in it is another one after each start.</p></html>"
+            "<p>The address stands in the terminal in which <code>kineme studio</code> was started, that for a phone in"
+            " the code under <em>Use a phone</em>; copy the whole of it. The token in it is another one each time.</p>"
+            "</html>"
         )
         kind, body = b"text/html; charset=utf-8", page.encode()
     more = [(b"connection", b"close")] if status in {408, 413} else []  # the rest of the body is not read

@@ -55,6 +55,7 @@ class MoveRequest(PrimitiveRequest):
     size: Number | None = Field(None, gt=0)
     plane: Literal["xy", "xz", "yz"] = "xy"
     slow_down: bool = False
+    shapes: bool = Field(True, description="Whether the scene has the shapes of the arm, with meshes many megabytes.")
 
 
 class CheckOut(BaseModel):
@@ -139,7 +140,10 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
         result = _planned(studio, body, robot)
     except InfeasibleError as error:
         return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
-    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene_data(result, shapes_of(robot))}
+    scene = scene_data(result, shapes_of(robot))
+    if not body.shapes:
+        scene |= {"urdf": "", "meshes": []}
+    return {**_answer(robot, result.preflight), "refusal": None, "scene": scene}
 
 
 @router.post(

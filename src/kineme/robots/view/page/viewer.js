@@ -153,7 +153,7 @@
     new ResizeObserver(fit).observe(canvas.parentElement);
 
     function load() {
-      const isSame = shown.urdf === data.urdf;
+      const isSame = !data.urdf || shown.urdf === data.urdf;
       world.remove(...shown.parts);
       if (!isSame) {
         if (shown.arm) world.remove(shown.arm);
@@ -180,7 +180,7 @@
       const parts = executed.length > 1 ? [...whole, approach, movement, behind, ends.start, ends.goal] : [];
       if (wanted.length > 1) parts.push(light);
       if (parts.length) world.add(...parts);
-      Object.assign(shown, { urdf: data.urdf, parts, ends, light, approach, movement });
+      Object.assign(shown, { urdf: data.urdf || shown.urdf, parts, ends, light, approach, movement });
       paint();
       if (isSame) return;
       fit();

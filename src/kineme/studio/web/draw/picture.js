@@ -3,6 +3,8 @@ import { Board, color } from "../parts/canvas.js";
 import { ground, line, mark } from "../parts/lines.js";
 
 const FINGER = 10; // radius of the replayed point [px]
+/** Landmarks of a hand that belong together: the palm, and each finger from the wrist to its tip. */
+const HAND = [[5, 9, 13, 17], ...[1, 5, 9, 13, 17].map((k) => [0, k, k + 1, k + 2, k + 3])];
 
 export class Picture {
   /** @param {HTMLCanvasElement} canvas */
@@ -10,6 +12,8 @@ export class Picture {
     this.ink = [];
     this.rest = [];
     this.pen = null;
+    /** @type {number[][]|null} Landmarks of the hand that a camera sees. */
+    this.hand = null;
     /**
      * Height of the canvas when the drawing began [px]: ink stays under the hand whatever the window does.
      * @type {number|null}
@@ -52,6 +56,10 @@ export class Picture {
     if (ink.length) mark(context, ink[0], "dot", 6, color("--ink"));
     if (rest.length) mark(context, rest[rest.length - 1], "diamond", 8, color("--goal"));
     if (this.replayed !== null) this.paintReplayed(ink);
+    for (const bones of this.hand ? HAND : []) {
+      const joints = bones.map((k) => [this.hand[k][0] * this.board.height, (1 - this.hand[k][1]) * this.board.height]);
+      line(context, joints, { color: color("--soft"), width: 4, alpha: 0.5 });
+    }
     if (this.pen) mark(context, this.pixel(this.pen), "ring", 9, color("--text"));
   }
 

@@ -1,10 +1,11 @@
 // Programs that send movements: what each has sent so far, a line for each, and whether one is ignored.
-import { byId, fill, make } from "../parts/elements.js";
+import { byId, fill, keepingFocus, make } from "../parts/elements.js";
 
 const MOST = 10000; // samples that are held of a movement, the last ones
 
 /**
- * @typedef {{id: number, name: string, movement: number, samples: number[][], state: any, ended: any}} Source
+ * @typedef {{id: number, name: string, movement: number, samples: number[][], state: any, ended: any, hand?: any}}
+ *   Source
  */
 
 export class Sources {
@@ -12,6 +13,8 @@ export class Sources {
   constructor(changed, fewer) {
     this.changed = changed;
     this.fewer = fewer;
+    /** @type {((hand: import("./hand.js").Landmarks) => void)|null} Takes what a camera sees. */
+    this.hand = null;
     /** @type {Map<number, Source>} */
     this.connected = new Map();
     /** @type {Set<string>} Names: a program that comes back stays ignored. */
@@ -27,8 +30,11 @@ export class Sources {
     const added = news.samples.filter((sample) => sample.length === width);
     const source = { ...news, samples: [...samples, ...added].slice(-MOST) };
     this.connected.set(news.id, source);
+    if (!before && news.name === "phone") byId("phone").close(); // its code has been scanned
     if (before?.name !== news.name) this.list();
-    if (!this.ignored.has(source.name)) this.changed(source);
+    if (this.ignored.has(source.name)) return;
+    this.changed(source);
+    if (news.hand && news.hand.time !== before?.hand?.time) this.hand(news.hand);
   }
 
   /** @param {number} id */
@@ -38,9 +44,9 @@ export class Sources {
     this.fewer();
   }
 
-  /** The connection is new: the server tells of all that are there. */
+  /** The connection is new: the server tells of all that it has; a gamepad is none of its. */
   renewed() {
-    this.connected.clear();
+    for (const id of this.connected.keys()) if (id >= 0) this.connected.delete(id);
     this.list();
   }
 
@@ -53,9 +59,7 @@ export class Sources {
   }
 
   list() {
-    const focused = document.activeElement?.closest("#sources li")?.getAttribute("data-id");
-    fill(byId("sources"), ...[...this.connected.values()].map((source) => this.line(source)));
-    /** @type {HTMLElement} */ (byId("sources").querySelector(`[data-id="${focused}"] button`))?.focus();
+    keepingFocus(() => fill(byId("sources"), ...[...this.connected.values()].map((source) => this.line(source))));
   }
 
   /** @param {Source} source */
@@ -67,6 +71,7 @@ export class Sources {
         class: "button quiet",
         type: "button",
         "aria-pressed": String(off),
+        "data-key": `source ${source.id}`,
         "aria-label": `Ignore ${source.name}`,
         on: { click: () => this.ignore(source) },
       },
@@ -74,7 +79,7 @@ export class Sources {
     );
     return make(
       "li",
-      { "data-id": String(source.id), class: off ? "off" : "" },
+      { class: off ? "off" : "" },
       make("span", { class: "source-dot", "aria-hidden": "true" }),
       make("span", { class: "source-name" }, `Live source connected: ${source.name}`),
       button,

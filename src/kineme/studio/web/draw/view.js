@@ -9,9 +9,12 @@ import { currentView, show } from "../parts/views.js";
 import { hearAnswer, requestAnswer, showError, showState } from "./answers.js";
 import { hearerOf } from "./drawing.js";
 import { startFollowing } from "./follow.js";
+import { followGamepad } from "./gamepad.js";
+import { handPen } from "./hand.js";
 import { showInvitation } from "./invitation.js";
 import { followKeys } from "./keyboard_pen.js";
 import { startNaming } from "./naming.js";
+import { offerPhone } from "./phone.js";
 import { clear, createSession } from "./session.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -70,6 +73,10 @@ export function startDraw(send) {
   });
   listen(session);
   for (const host of document.querySelectorAll("[data-host]")) host.textContent = location.host;
+  followGamepad(byId("draw-canvas"), hearerOf(session), sources);
+  offerPhone();
+  sources.hand = handPen(session.picture, hearerOf(session));
+  window.addEventListener("kineme-hand", (event) => sources.hand(/** @type {CustomEvent} */ (event).detail));
   return {
     state: (/** @type {any} */ state) => showState(session, state),
     answer: (/** @type {any} */ answer) => hearAnswer(session, answer),

@@ -51,7 +51,7 @@ function showNumbers(session) {
   steps.keep(session.plan);
   byId("move-undo").disabled = !steps.has(-1);
   byId("move-redo").disabled = !steps.has(1);
-  byId("move-reset").disabled = steps.plans.length < 2;
+  byId("move-reset").disabled = steps.plans.length < 2 && !session.plan.style;
   showPoints(session.plan, pageOf(session));
 }
 

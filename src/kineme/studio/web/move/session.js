@@ -9,61 +9,40 @@ import { extent, rounded } from "./plan.js";
 import { Rollouts } from "./rollouts.js";
 import { Steps } from "./steps.js";
 
-/**
- * @typedef {Object} Session
- * @property {import("./plan.js").Plan|null} plan
- * @property {{id: string}|null} chosen The symbol that moves; another object whenever it starts anew.
- * @property {number} version Of the library when the symbol was chosen.
- * @property {boolean} dragging A point is held.
- * @property {Steps} steps
- * @property {Camera} camera
- * @property {Handles} handles
- * @property {MovePicture} picture
- * @property {Plot} speed
- * @property {Plot} acceleration
- * @property {Set<string>} ticked Formulations.
- * @property {Map<string, Rollouts>} rollouts Of each formulation.
- * @property {string|null} legend Formulations in it.
- * @property {Object} playback That is under way.
- * @property {number} resting Timer that waits until a style slider rests.
- */
-
-/**
- * @param {Object} page
- * @param {(session: Session) => void} page.moved A path is another one.
- * @param {(session: Session, dragging: boolean) => void} page.dragged A point is held, or let go.
- * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed
- * @returns {Session}
- */
-export function createSession(page) {
-  const camera = new Camera();
-  const handles = new Handles(camera, {
-    moving: (dragging) => page.dragged(session, dragging),
-    text: (value) => rounded(value, extent(session.plan.path)),
-  });
-  /** @type {Session} */
-  const session = {
-    plan: null,
-    chosen: null,
-    version: -1,
-    dragging: false,
-    steps: new Steps(),
-    camera,
-    handles,
-    picture: new MovePicture(
-      camera,
-      () => handles.place(),
-      (place, event) => session.plan && page.grabbed(session, place, event),
-    ),
-    speed: new Plot(byId("plot-speed")),
-    acceleration: new Plot(byId("plot-acceleration")),
-    ticked: new Set([FORMULATIONS[0].name]),
-    rollouts: new Map(FORMULATIONS.map(({ name }) => [name, new Rollouts(name, () => page.moved(session))])),
-    legend: null,
-    playback: {},
-    resting: 0,
-  };
-  return session;
+export class Session {
+  /**
+   * @param {Object} page
+   * @param {(session: Session) => void} page.moved A path is another one.
+   * @param {(session: Session, dragging: boolean) => void} page.dragged A point is held, or let go.
+   * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed
+   */
+  constructor(page) {
+    /** @type {import("./plan.js").Plan|null} */
+    this.plan = null;
+    /** @type {{id: string}|null} The symbol that moves; another object whenever it starts anew. */
+    this.chosen = null;
+    this.version = -1; // of the library when the symbol was chosen
+    this.dragging = false; // a point is held
+    this.steps = new Steps();
+    this.camera = new Camera();
+    this.handles = new Handles(this.camera, {
+      moving: (dragging) => page.dragged(this, dragging),
+      text: (value) => rounded(value, extent(this.plan.path)),
+    });
+    this.picture = new MovePicture(
+      this.camera,
+      () => this.handles.place(),
+      (place, event) => this.plan && page.grabbed(this, place, event),
+    );
+    this.speed = new Plot(byId("plot-speed"));
+    this.acceleration = new Plot(byId("plot-acceleration"));
+    this.ticked = new Set([FORMULATIONS[0].name]);
+    this.rollouts = new Map(FORMULATIONS.map(({ name }) => [name, new Rollouts(name, () => page.moved(this))]));
+    /** @type {string|null} Formulations in it. */
+    this.legend = null;
+    this.playback = {}; // that is under way
+    this.resting = 0; // timer that waits until a style slider rests
+  }
 }
 
 /** Formulations that move: those that are ticked; a style moves in its own alone. @param {Session} session */

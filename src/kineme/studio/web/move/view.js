@@ -10,9 +10,7 @@ import { startFormulations } from "./formulations.js";
 import { play, showPaths } from "./paths.js";
 import { showPick } from "./pick.js";
 import { chooseSymbol, saveMovement, tickFormulations } from "./requests.js";
-import { createSession } from "./session.js";
-
-/** @typedef {import("./session.js").Session} Session */
+import { Session } from "./session.js";
 
 /** Hide the parts of the view where no symbol can move, and say so. @param {boolean} empty */
 function showParts(empty) {
@@ -63,7 +61,7 @@ function listen(session) {
 }
 
 export function startMove() {
-  const session = createSession({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
+  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
   startFormulations((names) => tickFormulations(session, names));
   listen(session);
 }

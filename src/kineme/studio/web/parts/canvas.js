@@ -58,7 +58,9 @@ export function color(token) {
   return /** @type {string} */ (colors.get(token));
 }
 
-window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+/** Paint again, after tokens have other colors. */
+export function recolor() {
   colors.clear();
   for (const board of boards) board.draw();
-});
+}
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolor);

@@ -83,14 +83,14 @@ export const breakable = (name) =>
  *     "redo-span"|"reset"|"robot-free"|"robot-go"|"robot-save"|"save"|"save-corrections"|"save-spans"|
  *     "show-unlabeled"|"spot"|"spot-page"|"undo"|"undo-span"|"zoom-in"|"zoom-out", HTMLButtonElement>
  *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"shape"|
- *     "stage"|"timeline-canvas", HTMLCanvasElement>
+ *     "stage"|"timeline-canvas"|"wand-canvas", HTMLCanvasElement>
  *   & Record<"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
  *     "why", HTMLDetailsElement>
- *   & Record<"ask"|"importing"|"keys", HTMLDialogElement>
+ *   & Record<"ask"|"importing"|"keys"|"phone", HTMLDialogElement>
  *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
- *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"naming-name"|
- *     "own-video"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|"tilt"|"time"|"turn"|
- *     "video-start", HTMLInputElement>
+ *   & Record<"ask-name"|"duration"|"episodes-from"|"file"|"find"|"find-pick"|"find-symbol"|"name"|
+ *     "naming-name"|"own-video"|"phone-host"|"playhead"|"robot-dragged"|"robot-size"|"robot-slow"|"style-mix"|
+ *     "tilt"|"time"|"turn"|"video-start", HTMLInputElement>
  *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|"save-format"|
  *     "tables", HTMLSelectElement>
  *   & Record<"importing-rows"|"spans", HTMLTableElement>

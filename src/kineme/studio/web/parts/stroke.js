@@ -62,7 +62,8 @@ export function followPointer(canvas, hear) {
     if (samples.length) hear.goes(samples);
   };
   canvas.addEventListener("pointermove", goes);
-  canvas.addEventListener("pointerrawupdate", goes); // the same samples, without waiting for the next frame
+  // The same samples, without waiting for the next frame; Chromium counts them from the corner of the outermost page.
+  if (window === window.top) canvas.addEventListener("pointerrawupdate", goes);
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
 }

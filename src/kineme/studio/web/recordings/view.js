@@ -4,7 +4,7 @@ import { learnSpans, undo } from "../parts/changes.js";
 import { byId, counted, fill, make, offer } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
-import { isUndo } from "../parts/shortcuts.js";
+import { isRedo, isUndo } from "../parts/shortcuts.js";
 import { tried } from "../parts/toasts.js";
 import { currentView } from "../parts/views.js";
 import { startDropping } from "./dropping.js";
@@ -239,9 +239,8 @@ class Recordings {
   /** Ctrl-Z is for the spans; without any change of these, for the library. @param {KeyboardEvent} event */
   takeBack(event) {
     if (currentView() !== "recordings" || event.defaultPrevented) return;
-    const again = event.ctrlKey || event.metaKey ? /^(y|Z)$/.test(event.key) : false;
     if (isUndo(event)) this.state ? this.step(-1) : undo();
-    else if (again) this.step(1);
+    else if (isRedo(event)) this.step(1);
     else return;
     event.preventDefault();
   }

@@ -77,6 +77,7 @@ const wanted = () => ({
   robot: byId("robot-arm").value,
   size: byId("robot-size").valueAsNumber || 0.3,
   slow_down: byId("robot-slow").checked,
+  shapes: false, // they came with the arm at rest
   displacement: byId("robot-dragged").checked && !place.goal ? draggedGoal(byId("robot-what").value) : null,
   ...place,
 });

@@ -1,0 +1,28 @@
+// A page in a cell tells its notebook what was drawn, what moves and how high it is, and is as dark as the notebook.
+
+import { recolor } from "../web/parts/canvas.js";
+
+const inNotebook = document.body.matches(".notebook");
+const rules = /** @type {CSSMediaRule[]} */ ([...document.styleSheets[0].cssRules]);
+const dark = rules.find(({ media }) => media?.mediaText.includes("color-scheme")).media;
+let drawings = [];
+
+/** @param {Object} state Parts of the widget's. */
+export const tell = (state) => inNotebook && parent.postMessage(state, "*");
+
+/** @param {[string|null, number[][]]} drawing A name, and samples. */
+export const tellDrawn = (drawing) => tell({ drawn: [...drawings, drawing] });
+
+/** @param {(state: {drawn: any[], moved: any}) => void} hear The widget's. */
+export function hearNotebook(hear) {
+  if (!inNotebook) return;
+  window.addEventListener("message", ({ source, data }) => {
+    if (source !== parent) return;
+    drawings = data.drawn;
+    dark.mediaText = data.dark ? "all" : "not all"; // whatever the system prefers
+    document.documentElement.style.colorScheme = data.dark ? "dark" : "light";
+    recolor();
+    hear(data);
+  });
+  new ResizeObserver(() => tell({ height: document.body.offsetHeight })).observe(document.body);
+}

@@ -1,0 +1,75 @@
+"""Widgets in Python: what they hold of what was drawn and moved, and what they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import DataError, SpecificationError
+
+pytest.importorskip("anywidget", reason="the extra notebook is not installed")
+from widget_samples import demonstrations
+
+from kineme.notebook import Draw, Move
+
+SAMPLES = [[0.1 * k, 0.2 * k, 1 - 0.1 * k] for k in range(5)]
+
+
+def test_what_was_drawn_is_movements_with_names_in_the_unit_of_the_area():
+    draw = Draw(height=2.0)
+    heard = []
+    draw.observe(heard.append, "drawn")
+    draw.drawn = [["wave", SAMPLES], [None, SAMPLES[:4]]]
+    first, last = draw.trajectories
+    np.testing.assert_allclose(first.times, [0, 0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(first.positions[-1], [1.6, 1.2])
+    assert (first.label, last.label, len(draw.trajectory), len(heard)) == ("wave", None, 4, 1)
+    draw.clear()
+    assert draw.trajectories == []
+    with pytest.raises(DataError, match="expected a movement, got none yet"):
+        _ = draw.trajectory
+
+
+def test_the_recognizer_answers_to_what_was_drawn():
+    demos = demonstrations()
+    draw = Draw(kineme.Recognizer().fit(demos))
+    movement = kineme.load_lasa(["Sine"])[6]
+    draw.drawn = [[None, np.column_stack((movement.times, movement.positions)).tolist()]]
+    assert draw.answer.ranked[0] == "Sine"
+    np.testing.assert_allclose(draw.trajectory.positions, movement.positions)
+    with pytest.raises(SpecificationError, match=r"Draw\(recognizer\)"):
+        _ = Draw().answer
+
+
+def test_a_library_is_taken_as_its_page_takes_it(tmp_path):
+    demos = demonstrations()
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos)
+        assert '"n_movements":6,' in Draw(library, most=6)._page
+
+
+def test_a_primitive_is_where_it_was_learned_until_it_is_dragged():
+    primitives = kineme.DMP().learn(demonstrations()[[0, 3, 4]])
+    move = Move(primitives)
+    np.testing.assert_allclose(move.goal, primitives.goals[0])
+    np.testing.assert_allclose(move.path.positions, primitives[0].rollout(n_samples=len(move.path)).positions[0])
+    assert (move.moved["name"], move.primitive.labels.tolist()) == ("1 CShape", ["CShape"])
+    move.moved = move.moved | {"name": "3 GShape", "goal": [1.0, 2.0]}
+    np.testing.assert_allclose(move.primitive.goals, primitives[2].goals)
+    assert move.goal.tolist() == [1.0, 2.0]
+    assert Move(kineme.DMP().learn(demonstrations()[[0, 3]])).moved["name"] == "CShape"
+    with pytest.raises(DataError, match="expected a movement in the cell"):
+        _ = Draw().goal
+
+
+def test_what_cannot_be_drawn_is_refused():
+    wide = kineme.Demonstrations.from_arrays([np.random.default_rng(k).normal(size=(20, 4)) for k in range(3)])
+    with pytest.raises(SpecificationError, match="got 4 dimensions, which cannot be drawn"):
+        Move(kineme.DMP().learn(wide))
+    with pytest.raises(SpecificationError, match="got 4 dimensions, which cannot be drawn"):
+        Draw(kineme.Recognizer().fit(wide, ["a", "b", "c"]))
+    with pytest.raises(SpecificationError, match="expected at most 100 primitives"):
+        Move(kineme.DMP().learn([demonstrations()[0]] * 101))
+    with pytest.raises(SpecificationError, match="height"):
+        Draw(height=0)
