@@ -14,7 +14,7 @@ from browsing import Pages, wait_until
 from kineme.datasets import EXAMPLES, load_example
 from kineme.studio.page.write_page import write_page
 
-VIEWS = ("draw", "library", "recordings", "robot")
+VIEWS = ("draw", "library", "move", "recordings", "robot")
 MOST = 20  # enabled controls on a first screen
 WORDS = ("Sure", "Probably", "Looks like", "New")
 ANSWERED = f"{list(WORDS)}.includes(document.getElementById('verdict-kind').textContent)"
