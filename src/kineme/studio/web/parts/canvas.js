@@ -58,6 +58,23 @@ export function color(token) {
   return /** @type {string} */ (colors.get(token));
 }
 
+/**
+ * Paint the board of a canvas with another context, in the colors of paper.
+ * @param {HTMLCanvasElement} canvas
+ * @param {(board: Board) => any} contextOf
+ */
+export function paintOnPaper(canvas, contextOf) {
+  const board = [...boards].find((other) => other.canvas === canvas);
+  const rules = /** @type {CSSStyleRule[]} */ ([...document.styleSheets].flatMap(({ cssRules }) => [...cssRules]));
+  const { style } = rules.find((rule) => rule.selectorText === ":root");
+  for (const token of style) colors.set(token, style.getPropertyValue(token).trim());
+  const screen = board.context;
+  board.context = contextOf(board);
+  board.paint(board);
+  board.context = screen;
+  recolor();
+}
+
 /** Paint again, after tokens have other colors. */
 export function recolor() {
   colors.clear();

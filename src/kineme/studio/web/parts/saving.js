@@ -1,0 +1,158 @@
+// "Save picture": what a canvas shows, on white and with its name, as SVG or PNG.
+import { paintOnPaper } from "./canvas.js";
+import { byId, make } from "./elements.js";
+import { svg } from "./svg.js";
+
+/** Canvas -> the element that says what it shows. */
+const NAMES = {
+  "draw-canvas": "verdict",
+  map: "map-title",
+  "move-canvas": "move-name",
+  "timeline-canvas": "recording-name",
+};
+const HEAD = 40; // height of the name [px]
+const SHARP = 2; // pixels of a PNG for one on the screen
+
+/** A context that writes SVG: as much of one as the pictures use; circles are whole. */
+class Drawing extends /** @type {any} */ (Object) {
+  /** @param {CanvasRenderingContext2D} screen */
+  constructor(screen) {
+    super();
+    Object.assign(this, { screen, items: [], saved: [], x: 0, y: 0, d: "", dash: "none", globalAlpha: 1 });
+  }
+  save() {
+    this.saved.push({ ...this });
+  }
+  restore() {
+    Object.assign(this, this.saved.pop());
+  }
+  translate(x, y) {
+    this.x += x;
+    this.y += y;
+  }
+  setLineDash(dash) {
+    this.dash = dash.join(" ") || "none";
+  }
+  beginPath() {
+    this.d = "";
+  }
+  moveTo(x, y, letter = "M") {
+    this.d += `${letter}${x + this.x} ${y + this.y}`;
+  }
+  lineTo(x, y) {
+    this.moveTo(x, y, "L");
+  }
+  closePath() {
+    this.d += "Z";
+  }
+  arc(x, y, r) {
+    this.moveTo(x - r, y);
+    this.d += `a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`;
+  }
+  rect(x, y, w, h) {
+    this.moveTo(x, y);
+    this.d += `h${w}v${h}h${-w}Z`;
+  }
+  roundRect(x, y, w, h) {
+    this.rect(x, y, w, h);
+  }
+  fillRect(...box) {
+    this.beginPath();
+    this.rect(...box);
+    this.fill();
+  }
+  measureText(text) {
+    this.screen.font = this.font;
+    return this.screen.measureText(text);
+  }
+  stroke() {
+    this.add("path", { d: this.d, ...this.pen() });
+  }
+  fill() {
+    this.add("path", { d: this.d, fill: this.fillStyle });
+  }
+  strokeText(text, x, y) {
+    this.text(text, x, y, this.pen());
+  }
+  fillText(text, x, y) {
+    this.text(text, x, y, { fill: this.fillStyle });
+  }
+  text(text, x, y, look) {
+    const anchor = { center: "middle", right: "end" }[this.textAlign] ?? "start";
+    this.add("text", { x: x + this.x, y: y + this.y, "text-anchor": anchor, ...look }, new Text(text));
+    this.items.at(-1).style.font = this.font;
+  }
+  pen() {
+    const ends = { "stroke-linecap": this.lineCap ?? "butt", "stroke-linejoin": this.lineJoin ?? "miter" };
+    return {
+      fill: "none",
+      stroke: this.strokeStyle,
+      "stroke-width": this.lineWidth,
+      "stroke-dasharray": this.dash,
+      ...ends,
+    };
+  }
+  add(tag, look, ...inside) {
+    this.items.push(svg(tag, { opacity: this.globalAlpha, ...look }, ...inside));
+  }
+}
+
+/** @param {HTMLCanvasElement} canvas @param {string} name @returns {SVGElement} */
+function drawn(canvas, name) {
+  const { clientWidth: width, clientHeight: height } = canvas;
+  let drawing;
+  paintOnPaper(canvas, ({ context }) => {
+    drawing = new Drawing(context);
+    return drawing;
+  });
+  return svg(
+    "svg",
+    {
+      xmlns: "http://www.w3.org/2000/svg",
+      width,
+      height: height + HEAD,
+      viewBox: `0 ${-HEAD} ${width} ${height + HEAD}`,
+    },
+    svg("title", {}, new Text(name)),
+    svg("rect", { y: -HEAD, width, height: height + HEAD, fill: "#fff" }),
+    svg(
+      "text",
+      { x: 16, y: -12, "font-family": "system-ui,sans-serif", "font-size": 18, "font-weight": 600 },
+      new Text(name),
+    ),
+    ...drawing.items,
+  );
+}
+
+/** @param {string} canvas Its id. @param {string} kind svg or png */
+async function save(canvas, kind) {
+  const shown = byId(NAMES[canvas]).textContent.trim();
+  const name = /\p{L}|\p{N}/u.test(shown) ? shown : "Drawing";
+  const picture = drawn(/** @type {any} */ (byId(canvas)), name);
+  let href = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(picture))}`;
+  if (kind === "png") {
+    const image = make("img", { src: href });
+    await image.decode();
+    const sheet = make("canvas", { width: SHARP * image.width, height: SHARP * image.height });
+    sheet.getContext("2d").drawImage(image, 0, 0, sheet.width, sheet.height);
+    href = sheet.toDataURL();
+  }
+  make("a", { href, download: `${name}.${kind}` }).click();
+}
+
+/** A control below each picture. */
+export function startSaving() {
+  for (const canvas of Object.keys(NAMES)) {
+    const menu = make("details", { class: "saving" }, make("summary", { class: "button quiet" }, "Save picture"));
+    const act = (kind) => () => {
+      menu.open = false;
+      save(canvas, kind);
+    };
+    for (const kind of ["svg", "png"])
+      menu.append(make("button", { class: "button", type: "button", on: { click: act(kind) } }, kind.toUpperCase()));
+    const stage = byId(canvas).closest(".stage");
+    const row = stage.nextElementSibling;
+    if (row?.matches(".row:not(.nowrap)")) row.append(menu);
+    else stage.after(menu);
+  }
+}

@@ -1,0 +1,102 @@
+"""Every picture of the studio is saved as SVG and as PNG: on white, in light colors, with its name."""
+
+from __future__ import annotations
+
+import io
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from browser_samples import draw, letters, make_letters, settle, show
+from test_browser import UNANSWERED, Served
+
+import kineme
+from browsing import Pages, wait_until
+
+SVG = "{http://www.w3.org/2000/svg}"
+INK = "#0072b2"  # of the light palette
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """A dark studio with something in each of its pictures."""
+    folder = tmp_path_factory.mktemp("pictures")
+    studio = Served(make_letters(folder / "letters"), read_only=True)
+    pages = Pages(browser, script=UNANSWERED)
+    page = pages.new(color_scheme="dark")
+    page.goto(f"{studio.address}/?token={studio.token}#draw")
+    wait_until(page, "document.getElementById('status').dataset.state === 'here'")
+    draw(page, letters("GShape")[6])
+    wait_until(page, "document.querySelector('#verdict').textContent === 'GShape'")
+    show(page, "move")
+    show(page, "library")
+    show(page, "recordings")
+    x = np.concatenate([movement.positions for movement in letters("Sine")[:2]])
+    kineme.write_movement(folder / "long & <b>.csv", {"times": np.arange(len(x)) / 100, "positions": x})
+    page.set_input_files("#file", str(folder / "long & <b>.csv"))
+    wait_until(page, "document.getElementById('recording-name').textContent !== ''")
+    settle(page)
+    yield page
+    pages.leave(studio.address, "blob:", "data:")
+    pages.close()
+    studio.end()
+
+
+def saved(page, view, kind):
+    """The file that the control of a view gives, its name and bytes."""
+    show(page, view)
+    page.click(f"#view-{view} .saving summary")
+    with page.expect_download() as given:
+        page.click(f"#view-{view} .saving button:text('{kind}')")
+    assert page.locator(f"#view-{view} .saving[open]").count() == 0
+    return given.value.suggested_filename, given.value.path().read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("view", "name", "holds"),
+    [
+        ("draw", "GShape", f'stroke="{INK}"'),
+        ("library", "Map", ">GShape</text>"),
+        ("move", None, 'stroke-width="3.5"'),
+        ("recordings", "long & <b>.csv", ">s</text>"),
+    ],
+)
+def test_a_picture_is_saved_with_its_name_on_white(page, view, name, holds):
+    file, content = saved(page, view, "SVG")
+    root = ElementTree.fromstring(content)
+    title = root.findtext(f"{SVG}title")
+    assert (name or title) == title != ""
+    assert file.endswith(".svg")
+    assert root.find(f"{SVG}rect").get("fill") == "#fff"
+    text = content.decode()
+    assert holds in text
+    assert not re.findall(r"undefined|NaN", text)
+    assert "#171b1f" not in text  # of the dark palette
+    assert len(root.findall(f"{SVG}path")) >= 2
+    assert root.findall(f"{SVG}text")[0].text == title
+
+    Image = pytest.importorskip("PIL.Image", reason="the package pillow is not installed")
+    file, content = saved(page, view, "PNG")
+    assert file.endswith(".png")
+    pixels = np.asarray(Image.open(io.BytesIO(content)).convert("RGB"))
+    assert pixels.shape[:2] == (2 * int(root.get("height")), 2 * int(root.get("width")))
+    assert (pixels[0] == 255).all()
+    assert 0.001 < (pixels != 255).any(axis=2).mean() < 0.5
+
+
+def test_the_screen_stays_as_dark_as_it_was(page):
+    show(page, "draw")
+    ink = "[...document.getElementById('draw-canvas').getContext('2d').getImageData(0, 0, 1500, 1500).data]"
+    before = page.evaluate(f"{ink}.reduce((sum, value) => sum + value, 0)")
+    saved(page, "draw", "SVG")
+    settle(page)
+    assert page.evaluate(f"{ink}.reduce((sum, value) => sum + value, 0)") == before
+
+
+def test_the_control_is_within_a_narrow_window(page):
+    page.set_viewport_size({"width": 390, "height": 844})
+    for view in ("draw", "library", "move", "recordings"):
+        show(page, view)
+        box = page.locator(f"#view-{view} .saving").bounding_box()
+        assert 0 <= box["x"] <= box["x"] + box["width"] <= 390
