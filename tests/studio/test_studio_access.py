@@ -321,9 +321,8 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-READING = {
-    f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "robots/move", "recordings", "wand")
-}
+READING = {f"/{path}" for path in ("recognize", "why", "rollout", "primitive", "export", "recordings", "wand")}
+READING |= {f"/robots/{act}" for act in ("move", "export", "follow")}
 READING |= {f"/recordings/{{key}}/{act}" for act in ("spotted", "read", "shapes", "annotations")} | {
     "/episodes/{key}/spans"
 }

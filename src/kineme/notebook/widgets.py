@@ -6,6 +6,8 @@ notebook was exported with its widgets, and no kernel answers.
 
 from __future__ import annotations
 
+from typing import Any
+
 import anywidget
 import numpy as np
 import traitlets
@@ -30,8 +32,8 @@ class _Page(anywidget.AnyWidget):
     _esm = (FOLDER / "notebook.js").read_text(encoding="utf-8")
     _page = traitlets.Unicode().tag(sync=True)
     _title = traitlets.Unicode().tag(sync=True)
-    drawn = traitlets.List().tag(sync=True)
-    moved = traitlets.Dict().tag(sync=True)
+    drawn: Any = traitlets.List().tag(sync=True)
+    moved: Any = traitlets.Dict().tag(sync=True)
 
     def _moving(self, part: str) -> Array:
         if not self.moved:

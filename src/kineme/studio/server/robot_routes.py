@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter
+from fastapi import Path as InPath
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
@@ -29,6 +30,7 @@ from kineme.studio.server.rollout_routes import PrimitiveRequest, as_file, learn
 from kineme.studio.server.studio import Reads, Studio
 
 _ROS = {".yaml": write_action_goal, ".mcap": write_bag, ".bag": write_bag}  # beside the writers of tables
+ArmName = Annotated[str, InPath(max_length=200, description="Name of an arm, as in `/api/robots`.")]
 _STEPS = 6  # towards the hand, from where the arm stands
 _REACH = 0.4  # of the distance of the tip at rest: half of the square that the hand moves in
 
@@ -126,7 +128,7 @@ def robots(studio: Reads) -> dict[str, Any]:
 
 
 @router.get("/{name}", response_model=MoveOut, summary="An arm at rest")
-def at_rest(studio: Reads, name: Text) -> dict[str, Any]:
+def at_rest(studio: Reads, name: ArmName) -> dict[str, Any]:
     """What draws it before it has moved."""
     robot = _arm(name)
     return {**_answer(robot, None), "refusal": None, "scene": posture_data(robot, shapes_of(robot))}

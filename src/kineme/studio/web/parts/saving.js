@@ -1,7 +1,7 @@
 // "Save picture": what a canvas shows, on white and with its name, as SVG or PNG.
 import { paintOnPaper } from "./canvas.js";
 import { byId, make } from "./elements.js";
-import { svg } from "./svg.js";
+import { svg } from "./thumbnails.js";
 
 /** Canvas -> the element that says what it shows. */
 const NAMES = {
