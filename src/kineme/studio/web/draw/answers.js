@@ -1,5 +1,6 @@
 // What the server says of the movement on the canvas: while it is drawn, and once it is over.
 import { byId } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
 import { currentView } from "../parts/views.js";
 
@@ -84,6 +85,15 @@ export function showError(session, text) {
   return drawing || pending;
 }
 
+/** Ask again about a drawing that was learned, once that is taken back. @param {Session} session */
+export function reopen(session) {
+  const { learned } = session;
+  if (!learned || library().n_movements >= learned.of) return;
+  Object.assign(session, { movement: learned.movement, learned: null, pointer: "" });
+  if (library().symbols.length) requestAnswer(session);
+  else showAnswer(session, null);
+}
+
 /** @param {Session} session @param {string} text Why there is no answer. */
 function showRefusal(session, text) {
   session.pending = false;
@@ -97,5 +107,5 @@ function showRefusal(session, text) {
  * @param {Session} session
  */
 function focusName({ pointer, naming }) {
-  if (!["touch", "program"].includes(pointer) && currentView() === "draw") naming.focus();
+  if (!["", "touch", "program"].includes(pointer) && currentView() === "draw") naming.focus();
 }
