@@ -3,10 +3,10 @@ import { learnExample } from "../parts/changes.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { followTurns } from "../parts/dragging.js";
 import { byId } from "../parts/elements.js";
-import { library, onLibrary, symbolNamed } from "../parts/library_state.js";
+import { onLibrary, symbolNamed } from "../parts/library_state.js";
 import { followPointer } from "../parts/stroke.js";
 import { currentView, show } from "../parts/views.js";
-import { hearAnswer, reopen, requestAnswer, showError, showState } from "./answers.js";
+import { hearAnswer, membersOf, reopen, requestAnswer, showError, showState } from "./answers.js";
 import { hearerOf } from "./drawing.js";
 import { startFollowing } from "./follow.js";
 import { followGamepad } from "./gamepad.js";
@@ -21,7 +21,7 @@ import { clear, createSession } from "./session.js";
 
 /** @param {Session} session @param {string|null} name Under which the movement was learned. */
 function showLearned(session, name) {
-  const learned = { movement: session.movement, of: library().n_movements };
+  const learned = { movement: session.movement, name, members: membersOf(name) };
   Object.assign(session, { label: name, movement: null, learned });
   session.naming.empty();
   session.naming.allow(false);
