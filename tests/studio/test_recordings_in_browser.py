@@ -82,6 +82,7 @@ def test_a_table_without_times_is_asked_for_them_and_opens(opened):
     wait_for_text(page, "#recording-name", "drawn.csv")
     assert "40 samples a second" in page.inner_text("#recording-facts")
     assert "mm" in page.inner_text("#channels")
+    assert page.is_hidden('[aria-label="What was found"]')  # nothing was, and nothing takes the focus
     duration = page.inner_text("#playhead-text").split(" of ")[1]
     wait_for_text(page, "#shape-name", f"0.00 to {duration}: no annotation")  # no longer than the recording
     page.click("text=How it was read")

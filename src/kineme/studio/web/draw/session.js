@@ -19,8 +19,8 @@ export const FEWEST_SAMPLES = 4; // that make a movement
  * @property {boolean} drawing The pen is down.
  * @property {boolean} pending The movement is over, and its answer is still to come.
  * @property {Movement|null} movement That is over: it can be learned.
- * @property {{movement: Movement, name: string|null, members: number}|null} learned From this drawing; so many had the name
- *   then.
+ * @property {{movement: Movement, name: string|null, members: number}|null} learned From this drawing; so many
+ *   had the name then.
  * @property {string} pointer What draws: mouse, pen, touch, keyboard or program.
  * @property {number} height Of the canvas, in the units of the library.
  * @property {string|null} label
