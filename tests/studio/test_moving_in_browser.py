@@ -127,6 +127,8 @@ def test_a_small_obstacle_is_moved_and_not_widened(opened):
     wait_until(page, f"{HANDLES} === 2")
     page.click("#add-obstacle")
     settle(page)
+    for _ in range(8):
+        page.locator(".handle.rim").press("ArrowLeft")
     on = "([x, y]) => document.elementFromPoint(x, y).classList.contains('obstacle')"
     assert page.evaluate(on, center(page, ".handle.obstacle"))
 
