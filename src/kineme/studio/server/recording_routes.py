@@ -165,6 +165,7 @@ class SearchedOut(BaseModel):
 
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+annotation_router = APIRouter(prefix="/api/recordings", tags=["annotations"])
 
 #: Format of annotations that is a file of its own -> its ending.
 _ENDINGS = {name: writer.endings[0] for name, writer in WRITERS.items() if writer.copies is None} | {"rerun": ".rrd"}
@@ -247,7 +248,7 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     return drawn
 
 
-@router.post(
+@annotation_router.post(
     "/{key}/annotations",
     summary="Annotations as a file",
     response_class=FileResponse,
@@ -277,7 +278,7 @@ def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -
     return FileResponse(path, headers=headers, background=BackgroundTask(rmtree, folder, ignore_errors=True))
 
 
-@router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
+@annotation_router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
 async def spotted(studio: Reads, request: Request, key: records.RecordingKey, body: SpotRequest) -> dict[str, Any]:
     """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample.
 
@@ -311,13 +312,13 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         studio.works.end(key, work)
 
 
-@router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
+@annotation_router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
 def searched(studio: Reads, key: records.RecordingKey) -> dict[str, Any]:
     """The share that is done; null where nothing is searched."""
     return {"share": studio.works.share(key)}
 
 
-@router.post("/{key}/learn", response_model=records.LearnedOut, summary="Learn stretches of a recording")
+@annotation_router.post("/{key}/learn", response_model=records.LearnedOut, summary="Learn stretches of a recording")
 def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one.
 

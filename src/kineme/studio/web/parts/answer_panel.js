@@ -78,7 +78,7 @@ export class AnswerPanel {
 
   /** Beside the words: an example. @param {number[][]|null} path */
   show(path) {
-    byId("nearest").setAttribute("aria-label", path ? `Like an example of ${this.like}` : "");
+    byId("nearest").setAttribute("aria-label", path ? `Like an example of ${this.like}` : "No example");
     this.nearest.show(path && { path });
   }
 
