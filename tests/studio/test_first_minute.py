@@ -114,7 +114,7 @@ def test_a_stranger_is_recognized_after_five_actions(opened, tmp_path, narrow):
     phone = {"width": 390, "height": 844, "has_touch": True, "is_mobile": True, "kind": "phone"}
     page = opened(tmp_path / "new", **(phone if narrow else {}))
     seen = page.inner_text("main")
-    assert [word in seen for word in ("Draw it again", "try an example", "Send samples", "p-value")] == [1, 1, 0, 0]
+    assert [word in seen for word in ("Draw it again", "try an example", "or a program", "p-value")] == [1, 1, 0, 0]
     assert page.is_hidden("#ranks")
     assert page.is_hidden("#naming")
     hand = (lambda movement: draw_by_finger(page, movement, "#draw-canvas")) if narrow else lambda m: draw(page, m)
@@ -127,6 +127,9 @@ def test_a_stranger_is_recognized_after_five_actions(opened, tmp_path, narrow):
     page.keyboard.type("my own")  # 3
     page.keyboard.press("Enter")  # 4
     wait_for_text(page, "#verdict-kind", "Learned")
+    settle(page)
+    box = page.locator("#draw-canvas").bounding_box()
+    assert 0 <= box["y"] <= page.viewport_size["height"] - box["height"]  # also where a keyboard of glass was
     hand(strokes("S"))  # 5
     wait_until(page, ANSWERED)
     assert time.monotonic() - began < 30
@@ -168,6 +171,22 @@ def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples
         for role, overlay in (("Nearest", explained.nearest), ("Next", explained.runner_up))
     ]
     assert f"{100 * explained.nearest.differences.max():.0f} % of its size" in captions[0]
+
+
+def test_what_is_taken_back_is_asked_again(opened, tmp_path):
+    page = opened(tmp_path / "new")
+    page.click("text=Letters")
+    wait_until(page, "document.querySelectorAll('#known-symbols li').length === 10")
+    draw(page, strokes("C"))
+    wait_until(page, ANSWERED)
+    page.click("text=Yes, it is C")
+    wait_for_text(page, "#verdict-kind", "Learned")
+    page.click("#undo")
+    wait_for_text(page, "#verdict-kind", "Looks like")
+    assert page.locator(".toast:has-text('Undo')").count() == 0  # nothing offers to take it back once more
+    page.click("text=Yes, it is C")
+    wait_for_text(page, "#verdict-kind", "Learned")
+    wait_until(page, "document.getElementById('library-count').textContent === '10 symbols, 71 movements'")
 
 
 def test_the_page_explains_as_python_does(opened, tabs, examples):

@@ -122,6 +122,15 @@ def test_a_finger_drags_the_path_without_scrolling(opened):
     assert page.evaluate("window.scrollY") == before
 
 
+def test_a_small_obstacle_is_moved_and_not_widened(opened):
+    page = opened("move", width=390, height=844)
+    wait_until(page, f"{HANDLES} === 2")
+    page.click("#add-obstacle")
+    settle(page)
+    on = "([x, y]) => document.elementFromPoint(x, y).classList.contains('obstacle')"
+    assert page.evaluate(on, center(page, ".handle.obstacle"))
+
+
 def test_an_obstacle_on_a_via_point_is_said_and_drawn_as_touched(opened):
     page = opened("move")
     wait_until(page, f"{HANDLES} === 2")

@@ -82,6 +82,8 @@ def test_a_table_without_times_is_asked_for_them_and_opens(opened):
     wait_for_text(page, "#recording-name", "drawn.csv")
     assert "40 samples a second" in page.inner_text("#recording-facts")
     assert "mm" in page.inner_text("#channels")
+    duration = page.inner_text("#playhead-text").split(" of ")[1]
+    wait_for_text(page, "#shape-name", f"0.00 to {duration}: no annotation")  # no longer than the recording
     page.click("text=How it was read")
     assert "--units 0.025" in page.inner_text("#shell")
     assert "--measured-in mm" in page.inner_text("#shell")

@@ -34,6 +34,7 @@ def page(browser, tmp_path_factory):
     show(page, "recordings")
     x = np.concatenate([movement.positions for movement in letters("Sine")[:2]])
     kineme.write_movement(folder / "long & <b>.csv", {"times": np.arange(len(x)) / 100, "positions": x})
+    page.evaluate("document.getElementById('move-advanced').open = true")
     page.set_input_files("#file", str(folder / "long & <b>.csv"))
     wait_until(page, "document.getElementById('recording-name').textContent !== ''")
     settle(page)

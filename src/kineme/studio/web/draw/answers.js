@@ -1,9 +1,10 @@
 // What the server says of the movement on the canvas: while it is drawn, and once it is over.
 import { byId } from "../parts/elements.js";
+import { library, symbolNamed } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
 import { currentView } from "../parts/views.js";
 
-const SUGGESTED = 3; // names that the movement may have
+const SUGGESTED = 2; // names that the movement may have
 
 /** @typedef {import("./session.js").Session} Session */
 
@@ -84,6 +85,18 @@ export function showError(session, text) {
   return drawing || pending;
 }
 
+/** How many movements have a name. @param {string|null} name */
+export const membersOf = (name) => (name === null ? library().unlabeled : (symbolNamed(name)?.n_members ?? 0));
+
+/** Ask again about a drawing that was learned, once that is taken back. @param {Session} session */
+export function reopen(session) {
+  const { learned } = session;
+  if (!learned || membersOf(learned.name) >= learned.members) return;
+  Object.assign(session, { movement: learned.movement, learned: null, pointer: "" });
+  if (library().symbols.length) requestAnswer(session);
+  else showAnswer(session, null);
+}
+
 /** @param {Session} session @param {string} text Why there is no answer. */
 function showRefusal(session, text) {
   session.pending = false;
@@ -97,5 +110,5 @@ function showRefusal(session, text) {
  * @param {Session} session
  */
 function focusName({ pointer, naming }) {
-  if (!["touch", "program"].includes(pointer) && currentView() === "draw") naming.focus();
+  if (!["", "touch", "program"].includes(pointer) && currentView() === "draw") naming.focus();
 }

@@ -19,6 +19,8 @@ export const FEWEST_SAMPLES = 4; // that make a movement
  * @property {boolean} drawing The pen is down.
  * @property {boolean} pending The movement is over, and its answer is still to come.
  * @property {Movement|null} movement That is over: it can be learned.
+ * @property {{movement: Movement, name: string|null, members: number}|null} learned From this drawing; so many had the name
+ *   then.
  * @property {string} pointer What draws: mouse, pen, touch, keyboard or program.
  * @property {number} height Of the canvas, in the units of the library.
  * @property {string|null} label
@@ -35,6 +37,7 @@ export const createSession = (send) => ({
   drawing: false,
   pending: false,
   movement: null,
+  learned: null,
   pointer: "",
   height: 1,
   label: null,
@@ -58,7 +61,8 @@ export function clear(session) {
   byId("sources").classList.remove("waits");
   Object.assign(picture, { ink: [], rest: [], height: null, replayed: null, frame: null });
   picture.board.draw();
-  Object.assign(session, { source: null, movement: null, label: null, pending: false, drawing: false });
+  Object.assign(session, { source: null, movement: null, learned: null, label: null });
+  Object.assign(session, { pending: false, drawing: false });
   session.panel.idle();
   session.naming.allow(false);
   session.naming.empty();

@@ -6,7 +6,7 @@ import { byId } from "../parts/elements.js";
 import { onLibrary, symbolNamed } from "../parts/library_state.js";
 import { followPointer } from "../parts/stroke.js";
 import { currentView, show } from "../parts/views.js";
-import { hearAnswer, requestAnswer, showError, showState } from "./answers.js";
+import { hearAnswer, membersOf, reopen, requestAnswer, showError, showState } from "./answers.js";
 import { hearerOf } from "./drawing.js";
 import { startFollowing } from "./follow.js";
 import { followGamepad } from "./gamepad.js";
@@ -21,13 +21,15 @@ import { clear, createSession } from "./session.js";
 
 /** @param {Session} session @param {string|null} name Under which the movement was learned. */
 function showLearned(session, name) {
-  Object.assign(session, { label: name, movement: null });
+  const learned = { movement: session.movement, name, members: membersOf(name) };
+  Object.assign(session, { label: name, movement: null, learned });
   session.naming.empty();
   session.naming.allow(false);
   byId("draw-move").disabled = name === null;
   if (name !== null) session.panel.words("Learned", name, "Draw it again, anywhere and in any size.", "known", name);
   byId("sources").classList.remove("waits");
   byId("draw-canvas").focus({ preventScroll: true });
+  byId("draw-canvas").scrollIntoView({ block: "nearest" }); // where it is drawn again
 }
 
 /** Go to Move, with the symbol that was recognized. @param {Session} session */
@@ -55,7 +57,10 @@ function listen(session) {
     const isOurs = event.key === "Escape" && currentView() === "draw";
     if (isOurs && !document.querySelector("dialog[open]")) clear(session);
   });
-  onLibrary(() => showInvitation(picture.ink.length > 0));
+  onLibrary(() => {
+    showInvitation(picture.ink.length > 0);
+    reopen(session);
+  });
   for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-example]")))
     button.addEventListener("click", async () => {
       const { example } = button.dataset;

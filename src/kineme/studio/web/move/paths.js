@@ -36,8 +36,7 @@ export function showPaths(session) {
 /** Say what is wrong with paths, each once. @param {import("./rollouts.js").Rollouts[]} rollouts */
 function showWarnings(rollouts) {
   const warnings = rollouts.flatMap(({ problem, path }) => [problem, ...(path?.warnings ?? [])]).filter(Boolean);
-  const text = [...new Set(warnings)].join(" ");
-  write(byId("move-warnings"), text);
+  write(byId("move-warnings"), [...new Set(warnings)].join("; "));
 }
 
 /**

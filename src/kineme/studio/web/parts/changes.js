@@ -4,6 +4,7 @@ import { library, refresh } from "./library_state.js";
 import { say, tried } from "./toasts.js";
 
 let own = 0; // the version of the last change of this page
+let withdraw = () => {}; // the last offer to take a change back, which later changes make void
 let turn = Promise.resolve(); // of undoing, one after the other
 
 const KNOWN = "Nothing is new: all of it is in the library, and a movement keeps the name that it has there.";
@@ -21,7 +22,8 @@ async function change(ask, done, same = done) {
     own = answer.version;
     await refresh();
     const changed = answer.version > before; // not where it was stored already
-    say(
+    withdraw();
+    withdraw = say(
       changed ? done : same,
       changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {},
     );
@@ -43,6 +45,7 @@ async function takeBack(version) {
   if (!library().can_undo || library().read_only) return;
   await tried(async () => {
     own = (await post("/api/library/undo", { version: version ?? Math.max(own, library().version) })).version;
+    withdraw();
     await refresh();
     say("The last change is taken back.");
   });

@@ -151,8 +151,11 @@ export function startSaving() {
     for (const kind of ["svg", "png"])
       menu.append(make("button", { class: "button", type: "button", on: { click: act(kind) } }, kind.toUpperCase()));
     const stage = byId(canvas).closest(".stage");
-    const row = stage.nextElementSibling;
-    if (row?.matches(".row:not(.nowrap)")) row.append(menu);
+    const row =
+      canvas === "move-canvas" // where many controls are
+        ? byId("move-advanced")
+        : stage.parentElement.querySelector(":scope > .stage ~ .row:not(.nowrap)");
+    if (row) row.append(menu);
     else stage.after(menu);
   }
 }

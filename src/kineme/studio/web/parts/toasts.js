@@ -4,7 +4,10 @@ import { button, byId, make } from "./elements.js";
 
 const STAYS = 7000; // [ms]
 
-/** @param {string} text @param {{act?: () => void, action?: string, failed?: boolean}} options */
+/**
+ * @param {string} text @param {{act?: () => void, action?: string, failed?: boolean}} options
+ * @returns {() => void} Takes the message away.
+ */
 export function say(text, { act, action, failed = false } = {}) {
   const toast = make(
     "div",
@@ -25,6 +28,7 @@ export function say(text, { act, action, failed = false } = {}) {
   toast.addEventListener("pointerleave", () => {
     timer = setTimeout(close, STAYS);
   });
+  return close;
 }
 
 /** Run something and show what goes wrong. @template T @param {() => Promise<T>} act @returns {Promise<T|undefined>} */

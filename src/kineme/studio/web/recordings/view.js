@@ -167,7 +167,7 @@ class Recordings {
     const long = Math.max(SHORT, extent[1] / RESTS);
     const rests = Array.from({ length: Math.ceil(extent[1] / long) }, (_, k) => ({
       begin: k * long,
-      end: k * long + long,
+      end: Math.min(k * long + long, extent[1]),
     }));
     const stretches = [...spans, ...rests];
     this.stretches = stretches;
