@@ -182,6 +182,16 @@ def test_a_library_that_is_emptied_meanwhile_names_movements_as_before(tmp_path)
         assert heard.told[0].endswith("movements are named as before")
 
 
+def test_a_person_is_remembered_by_movements_that_are_over(library, monkeypatch):
+    """As `Live.next` does; the rest behind a movement is none of it."""
+    heard, ends = Heard(library), []
+    remember = heard.listener._live.remember
+    monkeypatch.setattr(heard.listener._live, "remember", lambda *given: ends.append(given[1]) or remember(*given))
+    heard.feed(take("Sine")).feed(take("CShape"))
+    assert ends == [symbol.end for symbol in heard.symbols if symbol.is_over]
+    assert len(ends) > 1
+
+
 def test_a_clock_that_stands_almost_still_takes_no_more_memory(library, monkeypatch):
     monkeypatch.setattr(listening, "_RECENT", 50)
     heard = Heard(library)

@@ -143,8 +143,10 @@ def transform(parent, child, x, turned, seconds):
     message.transform.rotation.z, message.transform.rotation.w = (0.5**0.5,) * 2 if turned else (0.0, 1.0)
     return message
 
-moving.publish(TFMessage(transforms=[transform("base", "tip", 1.0, True, 1.0)]))
-spin(node, lambda: any(kind == "no frame" for kind, _ in node.heard))
+for _ in range(15):  # nobody keeps a message for who has not joined yet
+    if not node.heard:
+        moving.publish(TFMessage(transforms=[transform("base", "tip", 1.0, True, 1.0)]))
+        spin(node, lambda: node.heard, 1.0)
 fixed.publish(TFMessage(transforms=[transform("tip", "camera", 0.5, False, 0.0)]))
 moving.publish(TFMessage(transforms=[transform("other", "thing", 9.0, False, 2.0)]))
 spin(node, lambda: False, 1.0)
