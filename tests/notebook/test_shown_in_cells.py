@@ -99,6 +99,13 @@ def test_a_thumbnail_is_in_its_frame(n_dims, size):
     assert ((points >= 7.9) & (points <= 92.1)).all()
 
 
+def test_a_thumbnail_shows_the_plane_in_which_a_path_is_widest():
+    u = np.linspace(0.0, 2.0 * np.pi, 65)[:-1]
+    svg = ElementTree.fromstring(thumbnail(np.column_stack((0.01 * np.sin(3 * u), 2 * np.cos(u), np.sin(u)))))
+    points = np.array([pair.split() for pair in svg.find("path").get("d")[1:].split("L")], dtype=float)
+    assert sorted(np.ptp(points, axis=0).tolist()) == pytest.approx([42.0, 84.0], abs=1.0)
+
+
 def test_a_thumbnail_stands_upright():
     """A path that rises to the right ends at the upper right, where pixels count from above."""
     svg = ElementTree.fromstring(thumbnail(np.array([[0.0, 0.0], [1.0, 1.0]])))

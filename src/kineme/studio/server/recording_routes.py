@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from shutil import rmtree
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
-from urllib.parse import quote
 
 import numpy as np
 from fastapi import APIRouter, Header, Request
-from fastapi.responses import FileResponse
+from fastapi.responses import Response
 from pydantic import BaseModel, Field
-from starlette.background import BackgroundTask
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.merge_files import Recordings
@@ -28,8 +26,9 @@ from kineme.studio.server import records
 from kineme.studio.server.importing import command, reader_options, unclear
 from kineme.studio.server.opened import columns_of, movement_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
+from kineme.studio.server.rollout_routes import as_file
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
-from kineme.studio.server.uploads import go_on, plain_name
+from kineme.studio.server.uploads import go_on
 
 
 class ChannelChoice(records.Change):
@@ -251,10 +250,10 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
 @annotation_router.post(
     "/{key}/annotations",
     summary="Annotations as a file",
-    response_class=FileResponse,
+    response_class=Response,
     responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
 )
-def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
+def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> Response:
     """Write stretches and their names as `kineme annotate` does, in each of its formats that is a file of its own."""
     if body.format not in _ENDINGS:
         raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
@@ -267,15 +266,13 @@ def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -
         )
         for span in sorted(body.spans, key=lambda span: span.begin)
     ]
-    folder = studio.uploads.new_folder()
-    name = plain_name(f"{source.path} {source.place}".strip()).replace(".", "_")
-    path = folder / f"{name}-labels{_ENDINGS[body.format]}"
-    if body.format == "rerun":
-        write_rerun(path, recording_scenes(recording, notes))
-    else:
-        write_annotations(path, notes, [Path(source.path)], body.format)
-    headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(path.name)}"}
-    return FileResponse(path, headers=headers, background=BackgroundTask(rmtree, folder, ignore_errors=True))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"labels{(ending := _ENDINGS[body.format])}"
+        if body.format == "rerun":
+            write_rerun(path, recording_scenes(recording, notes))
+        else:
+            write_annotations(path, notes, [Path(source.path)], body.format)
+        return as_file(path.read_bytes(), f"{source.path} {source.place}".strip(), f"-labels{ending}")
 
 
 @annotation_router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
