@@ -10,6 +10,7 @@ import pytest
 
 import kineme
 from kineme.reporting.page import thumbnail
+from kineme.reporting.table import Table, to_html
 
 NAMES = ("<b>wave</b>", "\x1b[31mred", "ok")
 
@@ -87,6 +88,11 @@ def test_of_many_movements_little_is_shown():
         assert text.count("<svg") == 20
         assert len(text) < 30_000
         assert "The first 20 of" in text
+
+
+def test_every_text_of_a_table_is_escaped():
+    text = to_html(Table("<i>", ("<b>", "<u>"), [("<s>", "<script>")], "<p>"))
+    assert [mark for mark in ("<i>", "<b>", "<u>", "<s>", "<script>", "<p><p>") if mark in text] == []
 
 
 @pytest.mark.parametrize("n_dims", [1, 2, 3, 7])

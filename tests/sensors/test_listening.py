@@ -211,6 +211,7 @@ def test_the_symbol_of_a_movement_that_ended_waits_for_no_recognition(library):
             break
     assert heard.ended == ["WShape"]
     assert 0 < len(calls) == before
+    assert calls[-1] == heard.symbols[-1].end  # the rest is no part of it
 
 
 @settings(max_examples=examples(20), deadline=None)

@@ -84,7 +84,8 @@ class Confusion:
             The package pandas is not installed.
         """
         names = [*map(str, self.labels), _NEW]
-        frame = data_frame(dict(enumerate(self.counts.T)))  # a class may be called "class" or "new"
+        # By numbers first: a class may be called "class" or "new".
+        frame = data_frame({str(k): column for k, column in enumerate(self.counts.T)})
         return frame.set_axis(names, axis=1).set_axis(names[:-1]).rename_axis("class")
 
     @overload
