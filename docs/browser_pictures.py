@@ -73,9 +73,11 @@ def show_library(page: Page) -> None:
 
 def show_move(page: Page) -> None:
     """A goal dragged to the right, in two formulations."""
+    page.evaluate("document.getElementById('pick-part').open = true")
     page.get_by_role("radio", name="GShape").check(force=True)
+    page.evaluate("document.getElementById('pick-part').open = false")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
-    page.locator("#formulations input").nth(1).check()
+    page.evaluate("document.querySelectorAll('#formulations input')[1].click()")  # folded under Advanced
     x, y = center(page, ".handle.goal")
     page.mouse.move(x, y)
     page.mouse.down()
@@ -91,6 +93,7 @@ def show_recordings(page: Page) -> None:
     wait_until(page, "!document.getElementById('recording').hidden")
     page.click("#spot")
     wait_until(page, "document.querySelectorAll('#spans tbody tr').length >= 4")
+    page.evaluate("scrollTo(0, 0)")
     page.locator("[data-key='span 0 begin']").evaluate("one => one.focus({ preventScroll: true })")
 
 
@@ -201,6 +204,7 @@ def picture_of_page(browser: Any, actions: Path, path: Path) -> None:
     wait_until(page, "window.kineme !== undefined")
     draw(page, letters("GShape")[6], on="#stage")
     wait_until(page, "kineme.state.answer !== null")
+    page.get_by_text("Drag it").click()
     box = page.locator("#stage").bounding_box() or {}
     x, y = page.evaluate("kineme.stage.project(kineme.state.moving.goal)")
     page.mouse.move(box["x"] + x, box["y"] + y)

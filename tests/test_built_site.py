@@ -69,7 +69,7 @@ QUESTIONS = {
     "install": "start/install",
     "docker": "how-to/the-first-call-is-slow",
     "NUMBA_CACHE_DIR": "how-to/the-first-call-is-slow",
-    "column_stack": "how-to/phone",  # it stands in code alone
+    "seconds_elapsed": "how-to/phone",  # it stands in code alone
     "what is a movement primitive": "concepts/movement-primitive",
     "inverse kinematics": "guide/robots",
     "recognize while it is made": "tutorials/recognize-live",

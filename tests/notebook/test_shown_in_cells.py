@@ -10,6 +10,7 @@ import pytest
 
 import kineme
 from kineme.reporting.page import thumbnail
+from kineme.reporting.table import Table, to_html
 
 NAMES = ("<b>wave</b>", "\x1b[31mred", "ok")
 
@@ -89,6 +90,11 @@ def test_of_many_movements_little_is_shown():
         assert "The first 20 of" in text
 
 
+def test_every_text_of_a_table_is_escaped():
+    text = to_html(Table("<i>", ("<b>", "<u>"), [("<s>", "<script>")], "<p>"))
+    assert [mark for mark in ("<i>", "<b>", "<u>", "<s>", "<script>", "<p><p>") if mark in text] == []
+
+
 @pytest.mark.parametrize("n_dims", [1, 2, 3, 7])
 @pytest.mark.parametrize("size", [0.0, 1e-90, 1.0, 1e90])
 def test_a_thumbnail_is_in_its_frame(n_dims, size):
@@ -97,6 +103,13 @@ def test_a_thumbnail_is_in_its_frame(n_dims, size):
     points = np.array([pair.split() for pair in svg.find("path").get("d")[1:].split("L")], dtype=float)
     assert points.shape == (64, 2)
     assert ((points >= 7.9) & (points <= 92.1)).all()
+
+
+def test_a_thumbnail_shows_the_plane_in_which_a_path_is_widest():
+    u = np.linspace(0.0, 2.0 * np.pi, 65)[:-1]
+    svg = ElementTree.fromstring(thumbnail(np.column_stack((0.01 * np.sin(3 * u), 2 * np.cos(u), np.sin(u)))))
+    points = np.array([pair.split() for pair in svg.find("path").get("d")[1:].split("L")], dtype=float)
+    assert sorted(np.ptp(points, axis=0).tolist()) == pytest.approx([42.0, 84.0], abs=1.0)
 
 
 def test_a_thumbnail_stands_upright():

@@ -114,6 +114,13 @@ def test_what_cannot_be_left_out_is_refused():
         confusion(LETTERS, folds=1)
 
 
+def test_a_data_frame_has_every_class_whatever_it_is_called():
+    pytest.importorskip("pandas")
+    frame = Confusion(("class", "new"), np.array([[1, 2, 3], [4, 5, 6]])).to_pandas()
+    assert (list(frame.index), list(frame.columns)) == (["class", "new"], ["class", "new", "new"])
+    assert frame.to_numpy().tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
 def test_two_movements_are_laid_over_each_other():
     """The other one moved, turned by 20 degrees and half as large, in twice the time, is the same."""
     movement, angle = LETTERS[8], np.radians(20)

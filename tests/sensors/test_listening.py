@@ -13,6 +13,7 @@ from sensor_samples import RATE, make_library, session, take
 
 import kineme
 from kineme.movements.channels.column_match import Columns
+from kineme.sensors import listen as listening
 from kineme.sensors.listen import NOTHING, Block, Listener, Summary, Symbol, listen
 from soaking import examples
 
@@ -170,6 +171,34 @@ def test_what_others_teach_is_known_from_the_next_movement_on(tmp_path):
     library.close()
 
 
+def test_a_library_that_is_emptied_meanwhile_names_movements_as_before(tmp_path):
+    with make_library(tmp_path / "actions") as library:
+        heard = Heard(library)
+        for symbol in library.symbols():
+            library.delete(symbol.name)
+        heard.feed(take("Sine")).feed(take("CShape"))
+        assert [name for name in heard.ended if name != "unknown"] == ["Sine", "CShape"]
+        assert heard.told[0].startswith("library: expected")
+        assert heard.told[0].endswith("movements are named as before")
+
+
+def test_a_person_is_remembered_by_movements_that_are_over(library, monkeypatch):
+    """As `Live.next` does; the rest behind a movement is none of it."""
+    heard, ends = Heard(library), []
+    remember = heard.listener._live.remember
+    monkeypatch.setattr(heard.listener._live, "remember", lambda *given: ends.append(given[1]) or remember(*given))
+    heard.feed(take("Sine")).feed(take("CShape"))
+    assert ends == [symbol.end for symbol in heard.symbols if symbol.is_over]
+    assert len(ends) > 1
+
+
+def test_a_clock_that_stands_almost_still_takes_no_more_memory(library, monkeypatch):
+    monkeypatch.setattr(listening, "_RECENT", 50)
+    heard = Heard(library)
+    heard.take(Block(50.0 + 1e-9 * np.arange(300), np.zeros((300, 2))))
+    assert len(heard.listener._recent) <= 51
+
+
 def test_the_symbol_of_a_movement_that_ended_waits_for_no_recognition(library):
     """It was recognized while the rest was still short."""
     heard, calls = Heard(library), []
@@ -182,6 +211,7 @@ def test_the_symbol_of_a_movement_that_ended_waits_for_no_recognition(library):
             break
     assert heard.ended == ["WShape"]
     assert 0 < len(calls) == before
+    assert calls[-1] == heard.symbols[-1].end  # the rest is no part of it
 
 
 @settings(max_examples=examples(20), deadline=None)
@@ -226,8 +256,19 @@ class Recorded:
 
 
 class Broken(Recorded):
+    error = OSError("no route to host")
+
     def send(self, symbol):
-        raise OSError("no route to host")
+        raise self.error
+
+
+def test_it_ends_when_nobody_reads_the_standard_output_any_more(library):
+    source, broken = Recorded(take("Sine")), Broken([])
+    broken.error = BrokenPipeError()
+    with pytest.raises(BrokenPipeError):
+        listen(Listener(library, print), source, [broken], 20.0)
+    assert source.closed
+    assert broken.closed
 
 
 def test_ctrl_c_ends_with_a_summary_and_everything_is_closed_and_a_sink_that_fails_is_said(library):

@@ -11,6 +11,7 @@ import pytest
 from sensor_samples import make_library, take
 
 from kineme.errors import DataError
+from kineme.sensors import osc
 from kineme.sensors.listen import Listener, Symbol, listen
 from kineme.sensors.osc import OscSink, OscSource
 
@@ -81,6 +82,23 @@ def test_a_wrong_number_of_values_or_texts_are_left_out_and_said(source, sender_
     assert notes[1][1] == "expected 2 numbers in '/hand', got 3 values"
 
 
+def test_a_message_of_too_many_numbers_does_not_choose_the_address(source, sender_to):
+    sender = sender_to(source)
+    sender.send_message("/wide", [0.0] * 1001)
+    sender.send_message("/hand", [1.0, 2.0])
+    assert _received(source, 3)[1] == [[1.0, 2.0]]
+
+
+def test_a_flood_of_messages_is_read_in_parts(source, sender_to, monkeypatch):
+    monkeypatch.setattr(osc, "_MOST", 50)
+    bundle, message = OscBundleBuilder(IMMEDIATELY), OscMessageBuilder("/foot")
+    for _ in range(40):
+        bundle.add_content(message.build())
+    for _ in range(5):
+        sender_to(source).send(bundle.build())
+    assert [len(source.receive(5.0).notes) for _ in range(3)] == [80, 80, 40]
+
+
 def test_stamps_are_the_first_number_where_that_is_said(sender_to):
     source = OscSource(port=0, address="/hand", stamped=True)
     sender_to(source).send_message("/hand", [12.5, 1.0, 2.0])
@@ -141,12 +159,16 @@ def test_symbols_go_out_as_messages():
         sink = OscSink(server.server_address)
         sink.send(Symbol("wave", False, "looks like", 0.75, 1.5, math.nan, 2.0))
         sink.send(Symbol("größer", True, "sure", 1.0, 1.5, 2.5, 2.75))
+        sink.send(Symbol("late", False, "looks like", 0.5, 1e39, math.inf, -1e300))
+        server.handle_request()
         server.handle_request()
         server.handle_request()
         sink.close()
+    most = float(np.finfo(np.float32).max)  # numbers of OSC have 32 bits
     assert heard == [
         ("/kineme/begins", "wave", "looks like", 0.75, 1.5, 0.0, 2.0),
         ("/kineme/symbol", "größer", "sure", 1.0, 1.5, 2.5, 2.75),
+        ("/kineme/begins", "late", "looks like", 0.5, most, 0.0, -most),
     ]
 
 
@@ -164,6 +186,8 @@ def test_movements_that_are_sent_are_named_over_loopback(tmp_path, source, sende
     class Heard:
         def send(self, symbol):
             heard.append(symbol)
+            if symbol.is_over:
+                raise KeyboardInterrupt
 
         def close(self):
             done.set()
@@ -172,6 +196,6 @@ def test_movements_that_are_sent_are_named_over_loopback(tmp_path, source, sende
         listener = Listener(library, print)
         sending = threading.Thread(target=send)
         sending.start()
-        listen(listener, stamped, [Heard()], 3.0)
+        listen(listener, stamped, [Heard()], 60.0)
         sending.join()
     assert [symbol.name for symbol in heard if symbol.is_over] == ["GShape"]

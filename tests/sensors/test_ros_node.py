@@ -129,6 +129,8 @@ def test_movements_are_named_and_a_node_that_comes_later_hears_the_last_one(tmp_
 
 _FRAMES = """
 from tf2_msgs.msg import TFMessage
+from kineme.sensors import ros
+ros._MOST_FRAMES = 3
 node = Node(frame="base:camera")
 latched = rclpy.qos.QoSProfile(depth=1, durability=rclpy.qos.DurabilityPolicy.TRANSIENT_LOCAL)
 moving, fixed = peer.create_publisher(TFMessage, "/tf", 10), peer.create_publisher(TFMessage, "/tf_static", latched)
@@ -141,12 +143,15 @@ def transform(parent, child, x, turned, seconds):
     message.transform.rotation.z, message.transform.rotation.w = (0.5**0.5,) * 2 if turned else (0.0, 1.0)
     return message
 
-moving.publish(TFMessage(transforms=[transform("base", "tip", 1.0, True, 1.0)]))
-spin(node, lambda: any(kind == "no frame" for kind, _ in node.heard))
+for _ in range(15):  # nobody keeps a message for who has not joined yet
+    if not node.heard:
+        moving.publish(TFMessage(transforms=[transform("base", "tip", 1.0, True, 1.0)]))
+        spin(node, lambda: node.heard, 1.0)
 fixed.publish(TFMessage(transforms=[transform("tip", "camera", 0.5, False, 0.0)]))
 moving.publish(TFMessage(transforms=[transform("other", "thing", 9.0, False, 2.0)]))
 spin(node, lambda: False, 1.0)
-moving.publish(TFMessage(transforms=[transform("base", "tip", 2.0, True, 3.0)]))
+others = [transform("base", f"one more {k}", 7.0, False, 2.0) for k in range(2)]
+moving.publish(TFMessage(transforms=[*others, transform("base", "tip", 2.0, True, 3.0)]))
 spin(node, lambda: node.rows)
 node.close()
 print(json.dumps([block.times.tolist() for block in node.blocks if len(block.times)] + node.rows))

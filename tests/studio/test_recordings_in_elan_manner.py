@@ -82,6 +82,16 @@ def test_the_command_of_the_shell_reads_the_file_as_the_studio_does(shared_clien
     assert json.loads(capsys.readouterr().out)["seconds"] == pytest.approx(read["tables"][0]["duration"])
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16", "utf-16-be"])
+def test_a_table_that_is_longer_than_what_is_guessed_from_is_previewed_in_any_encoding(tmp_path, encoding):
+    path = tmp_path / "long.csv"
+    mark = "\ufeff" * (encoding == "utf-16-be")
+    path.write_text(mark + _text([np.arange(9000) / RATE, np.arange(9000)], "t [s],grüße"), encoding)
+    for data in (path.read_bytes(), path.read_bytes()[:4000]):
+        path.write_bytes(data)
+        assert table_preview(path)["heads"] == ["t [s]", "grüße"]
+
+
 def test_a_choice_that_is_refused_leaves_the_file_as_it_was_read(client):
     sent = _send(client, TABLES["clear"][0])
     path = f"/api/recordings/{sent['recording']}"
@@ -189,7 +199,7 @@ def test_annotations_are_written_in_every_format_of_the_shell_that_is_a_file(sha
     answer = shared_client.post(f"/api/recordings/{sent['recording']}/annotations", json=body)
     assert answer.status_code == 200, answer.text
     ending = {"csv": ".csv", "json": ".json", "elan": ".eaf", "audacity": ".txt", "rerun": ".rrd"}[form]
-    assert f"own%20words_csv-labels{ending}" in answer.headers["content-disposition"]
+    assert f"own_words_csv-labels{ending}" in answer.headers["content-disposition"]
     if form == "csv":
         first, second = csv.DictReader(io.StringIO(answer.text))
         assert (float(first["start"]), first["symbol"], first["p_value"]) == (7.25, "", "")

@@ -13,8 +13,10 @@ import pytest
 from node_runtime import NODE, REASON, ask
 from studio_samples import drawing, make_library
 
-from kineme import ActionLibrary, Demonstrations, Trajectory
+from kineme import DMP, ActionLibrary, Demonstrations, Trajectory
+from kineme.datasets import load_example
 from kineme.dmp.discrete.specification import FORMULATIONS
+from kineme.dmp.generation.generate import MovementOptions, learn_one
 from kineme.dmp.styles.model import learn_styles
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
@@ -291,3 +293,12 @@ def test_proposals_are_named_or_rejected(unlabeled):
     client.post("/api/library/undo")
     client.post("/api/library/undo")
     assert client.get("/api/library").json()["unlabeled"] == 12
+
+
+def test_a_bend_that_is_not_enough_gets_wider():
+    """Beside two obstacles on a wave, the first bends still touch them."""
+    (wave,) = load_example("gestures")[34:35]
+    places = [([3.6517, 0.2421], 1.2599), ([1.757, 1.1048], 1.1606)]
+    balls = [rollout_routes.Obstacle(center=center, radius=radius) for center, radius in places]
+    options = MovementOptions(meet_goal=True, rate=200 / wave.duration)
+    assert rollout_routes._around(learn_one(wave, DMP()), options, balls)[1] == []

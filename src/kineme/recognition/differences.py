@@ -84,7 +84,9 @@ class Confusion:
             The package pandas is not installed.
         """
         names = [*map(str, self.labels), _NEW]
-        return data_frame({"class": names[:-1], **dict(zip(names, self.counts.T, strict=True))}).set_index("class")
+        # By numbers first: a class may be called "class" or "new".
+        frame = data_frame({str(k): column for k, column in enumerate(self.counts.T)})
+        return frame.set_axis(names, axis=1).set_axis(names[:-1]).rename_axis("class")
 
     @overload
     def plot(self, ax: None = None) -> Figure: ...

@@ -33,6 +33,7 @@ _LONGEST = 3.0  # times as long as any demonstration: a movement that does not r
 _STOPPED = 2.0  # seconds without samples that are said
 _AGAIN = 5.0  # seconds until the same thing is said again
 _LATENCIES = 10_000  # that are remembered
+_RECENT = 10_000  # samples within a rest that are looked at, of a sensor whose clock stands almost still
 
 
 class Block(NamedTuple):
@@ -280,7 +281,7 @@ class Listener:
         """Keep a sample for as long as a rest takes, and return how far anything has moved since."""
         moved = row[None] if self._coordinates is None else self._coordinates.take(row[None])
         sample = np.concatenate(([t], row, moved[0]))[None]
-        old = max(int((self._recent[:, 0] <= t - self.rests.rest).sum()) - 1, 0)
+        old = max(int((self._recent[:, 0] <= t - self.rests.rest).sum()) - 1, len(self._recent) - _RECENT, 0)
         self._recent = np.concatenate((self._recent[old:], sample))
         return float(np.ptp(self._recent[:, 1 + self._width :], axis=0).max())
 
@@ -326,8 +327,11 @@ class Listener:
             self.summary.symbols[name] += 1
             yield Symbol(name, True, answer.certainty, answer.confidence, began, end, decided)
             self._live.remember(answer, end)
-        if self._version != self._library.version:
-            self._live, self._version = self._library.stream(), self._library.version
+        try:
+            if self._version != (version := self._library.version):
+                self._live, self._version = self._library.stream(), version
+        except KinemeError as error:  # of a library that holds no symbols any more, for example
+            self.note("library", f"{error}; movements are named as before")
         self._forget()
 
     def _forget(self) -> None:
@@ -354,6 +358,8 @@ def listen(listener: Listener, source: Source, sinks: Sequence[Sink], seconds: f
                     for sink in sinks:
                         try:
                             sink.send(symbol)
+                        except BrokenPipeError:  # nobody reads the standard output any more
+                            raise
                         except OSError as error:
                             listener.note("not sent", f"{error}")
                     listener.summary.latencies.append(time.monotonic() - arrival)

@@ -20,8 +20,9 @@ from kineme.sensors.listen import NOTHING, Block, Symbol
 
 LOOPBACK, PORT = "127.0.0.1", 9000
 _LARGEST = 65_536  # bytes of a datagram
-_MOST = 1000  # datagrams that are read at once
+_MOST = 1000  # samples and notes that are read at once, and those of one datagram more
 _MOST_VALUES = 1000  # of a sample
+_MOST_FLOAT = float(np.finfo(np.float32).max)  # that a message holds
 
 
 class OscSource:
@@ -53,8 +54,8 @@ class OscSource:
         """Wait for a datagram, and return the samples of all that are there."""
         times, rows, notes = list[float](), list[list[float]](), list[tuple[str, str]]()
         with suppress(TimeoutError, BlockingIOError):
-            for k in range(_MOST):
-                self._socket.settimeout(0.0 if k else timeout)
+            while len(rows) + len(notes) < _MOST:
+                self._socket.settimeout(0.0 if rows or notes else timeout)
                 datagram = self._socket.recv(_LARGEST)
                 now = time.monotonic() - self._opened
                 try:
@@ -71,7 +72,8 @@ class OscSource:
 
         for _, message in OscPacket(datagram).messages:
             values = list(message)
-            is_row = len(values) > self._stamped and all(type(value) in {int, float} for value in values)
+            is_row = 0 < len(values) - self._stamped <= _MOST_VALUES
+            is_row = is_row and all(type(value) in {int, float} for value in values)
             if self._address is None and is_row:
                 self._address = message.address
                 notes.append(("", f"listening to the address {message.address!r}, with {len(values)} numbers"))
@@ -79,7 +81,7 @@ class OscSource:
                 notes.append(("other address", f"messages to {message.address!r} are left out; --address chooses"))
                 continue
             width = len(values) - self._stamped
-            if self.columns is None and is_row and width <= _MOST_VALUES:
+            if self.columns is None and is_row:
                 self.columns = Columns(tuple(f"value{k}" for k in range(width)), (None,) * width)
             if not is_row or self.columns is None or width != len(self.columns.heads):
                 expected = "numbers" if self.columns is None else f"{len(self.columns.heads)} numbers"
@@ -96,7 +98,7 @@ class OscSink:
     """Symbols as messages to a UDP port: ``/kineme/symbol`` of movements that are over, ``/kineme/begins`` before.
 
     Their arguments are the name, how sure it is in a word, the confidence, and the stamps of start, of end and of the
-    sample that decided [s].
+    sample that decided [s], 0 where it is not known.
     """
 
     def __init__(self, send_to: tuple[str, int], same_clock: bool = False) -> None:
@@ -107,8 +109,9 @@ class OscSink:
     def send(self, symbol: Symbol) -> None:
         """Send a message; nobody need listen."""
         address = "/kineme/symbol" if symbol.is_over else "/kineme/begins"
-        seconds = [float(np.nan_to_num(value)) for value in (symbol.start, symbol.end, symbol.time)]
-        self._client.send_message(address, [symbol.name, symbol.certainty, float(symbol.confidence), *seconds])
+        seconds = np.nan_to_num((symbol.start, symbol.end, symbol.time), posinf=0.0, neginf=0.0)
+        numbers = np.clip((symbol.confidence, *seconds), -_MOST_FLOAT, _MOST_FLOAT).tolist()
+        self._client.send_message(address, [symbol.name, symbol.certainty, *numbers])
 
     def close(self) -> None:
         """Close the socket."""

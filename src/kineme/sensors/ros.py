@@ -124,10 +124,11 @@ class RosNode:
 
         def read(message: Any, is_static: bool = False) -> None:
             stamps = {edge_of(transform): nanoseconds_of(transform.header.stamp) for transform in message.transforms}
-            is_new = bool(stamps.keys() - frames.keys())
-            for transform in message.transforms[: _MOST_FRAMES - len(frames) if is_new else None]:
-                frames[edge_of(transform)] = np.array([transform_row(transform.transform)])
-            if is_new:
+            count = len(frames)
+            for edge, transform in zip(map(edge_of, message.transforms), message.transforms, strict=True):
+                if edge in frames or len(frames) < _MOST_FRAMES:
+                    frames[edge] = np.array([transform_row(transform.transform)])
+            if len(frames) > count:
                 try:
                     way[:] = chain(list(frames), *pair)
                 except DataError as error:

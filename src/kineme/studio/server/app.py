@@ -107,6 +107,7 @@ ROUTERS = (
     rollout_routes.router,
     change_routes.proposal_router,
     recording_routes.router,
+    recording_routes.annotation_router,
     episode_routes.router,
     robot_routes.router,
     live_socket.router,

@@ -47,7 +47,9 @@ def table_preview(path: Path) -> dict[str, Any] | None:
         return None
     with path.open("rb") as file:
         data = file.read(_BYTES)
-    data = data[: data.rfind(b"\n") + 1] or data
+    end = data.rfind(b"\n") + 1
+    end += end % 2 * (data[:2] in {b"\xff\xfe", b"\xfe\xff"})  # two bytes a letter, as spreadsheets export it
+    data = data[:end] or data
     lines = list(lines_of(data))
     if export_head(lines, len(data)) is not None:
         return None

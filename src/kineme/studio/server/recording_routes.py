@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from shutil import rmtree
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
-from urllib.parse import quote
 
 import numpy as np
 from fastapi import APIRouter, Header, Request
-from fastapi.responses import FileResponse
+from fastapi.responses import Response
 from pydantic import BaseModel, Field
-from starlette.background import BackgroundTask
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.reading.merge_files import Recordings
@@ -28,8 +26,9 @@ from kineme.studio.server import records
 from kineme.studio.server.importing import command, reader_options, unclear
 from kineme.studio.server.opened import columns_of, movement_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
+from kineme.studio.server.rollout_routes import as_file
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
-from kineme.studio.server.uploads import go_on, plain_name
+from kineme.studio.server.uploads import go_on
 
 
 class ChannelChoice(records.Change):
@@ -165,6 +164,7 @@ class SearchedOut(BaseModel):
 
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+annotation_router = APIRouter(prefix="/api/recordings", tags=["annotations"])
 
 #: Format of annotations that is a file of its own -> its ending.
 _ENDINGS = {name: writer.endings[0] for name, writer in WRITERS.items() if writer.copies is None} | {"rerun": ".rrd"}
@@ -247,13 +247,13 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     return drawn
 
 
-@router.post(
+@annotation_router.post(
     "/{key}/annotations",
     summary="Annotations as a file",
-    response_class=FileResponse,
+    response_class=Response,
     responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
 )
-def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> FileResponse:
+def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -> Response:
     """Write stretches and their names as `kineme annotate` does, in each of its formats that is a file of its own."""
     if body.format not in _ENDINGS:
         raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
@@ -266,18 +266,16 @@ def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -
         )
         for span in sorted(body.spans, key=lambda span: span.begin)
     ]
-    folder = studio.uploads.new_folder()
-    name = plain_name(f"{source.path} {source.place}".strip()).replace(".", "_")
-    path = folder / f"{name}-labels{_ENDINGS[body.format]}"
-    if body.format == "rerun":
-        write_rerun(path, recording_scenes(recording, notes))
-    else:
-        write_annotations(path, notes, [Path(source.path)], body.format)
-    headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(path.name)}"}
-    return FileResponse(path, headers=headers, background=BackgroundTask(rmtree, folder, ignore_errors=True))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"labels{(ending := _ENDINGS[body.format])}"
+        if body.format == "rerun":
+            write_rerun(path, recording_scenes(recording, notes))
+        else:
+            write_annotations(path, notes, [Path(source.path)], body.format)
+        return as_file(path.read_bytes(), f"{source.path} {source.place}".strip(), f"-labels{ending}")
 
 
-@router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
+@annotation_router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
 async def spotted(studio: Reads, request: Request, key: records.RecordingKey, body: SpotRequest) -> dict[str, Any]:
     """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample.
 
@@ -311,13 +309,13 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         studio.works.end(key, work)
 
 
-@router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
+@annotation_router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
 def searched(studio: Reads, key: records.RecordingKey) -> dict[str, Any]:
     """The share that is done; null where nothing is searched."""
     return {"share": studio.works.share(key)}
 
 
-@router.post("/{key}/learn", response_model=records.LearnedOut, summary="Learn stretches of a recording")
+@annotation_router.post("/{key}/learn", response_model=records.LearnedOut, summary="Learn stretches of a recording")
 def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one.
 

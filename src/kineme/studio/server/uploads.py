@@ -16,7 +16,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir, mkdtemp
+from tempfile import TemporaryDirectory, gettempdir
 from threading import Lock
 from typing import Any
 from urllib.parse import unquote
@@ -111,10 +111,6 @@ class Uploads:
                 f"expected one of the last {_MOST_FILES} recordings that were sent, got another; send it again"
             )
         return path
-
-    def new_folder(self) -> Path:
-        """Make an empty folder that is deleted with all others when the studio ends."""
-        return Path(mkdtemp(dir=self._folder.path))
 
     def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = go_on) -> Recordings:
         """Read a file with options of the reader from now on; where they are refused, it is read as before."""

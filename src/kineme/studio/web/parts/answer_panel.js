@@ -78,7 +78,8 @@ export class AnswerPanel {
 
   /** Beside the words: an example. @param {number[][]|null} path */
   show(path) {
-    byId("nearest").setAttribute("aria-label", path ? `Like an example of ${this.like}` : "");
+    byId("nearest").hidden = !path;
+    byId("nearest").setAttribute("aria-label", `Like an example of ${this.like}`);
     this.nearest.show(path && { path });
   }
 
