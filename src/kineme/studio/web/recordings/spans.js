@@ -32,7 +32,7 @@ export function showSpans(spans, chosen, page) {
       return make("td", { class: isTime ? null : "wide" }, input);
     };
     const time = { type: "number", step: "0.01", readOnly: k !== chosen };
-    const p = span.p?.toFixed(2) ?? "–";
+    const p = Number.isFinite(span.p) ? `p = ${span.p.toFixed(2)}` : "–";
     const away = button("×", () => page.remove(k), {
       ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, hidden: k !== chosen },
     });
@@ -42,7 +42,7 @@ export function showSpans(spans, chosen, page) {
       field("begin", "Begin", time),
       field("end", "End", time),
       field("label", "Name", { type: "text", list: "names", maxLength: "200", placeholder: "unknown" }),
-      make("td", { title: `p-value: ${p}` }, span.certainty ?? p),
+      make("td", { title: p }, span.certainty ?? p),
       make("td", {}, away),
     );
   };
