@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Self
+from typing import Annotated, Any, Self
 from urllib.parse import quote
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from fastapi.responses import Response
 from pydantic import BaseModel, Field, model_validator
 
@@ -17,6 +17,8 @@ from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS, encode_movement
 from kineme.library.grounding import prototype_of
 from kineme.library.storage import read
+from kineme.recognition.differences import compare, confusion
+from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
 from kineme.studio.server.studio import Reads, Studio
 from kineme.studio.snapshot import snapshot_of_primitive
@@ -374,6 +376,10 @@ def recognize(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     return studio.library.recognize(records.trajectory(body.times, body.positions), body.error_rate).to_dict()
 
 
+_CONFUSED, _MOST_CONFUSED = 300, 40  # movements, which take seconds, and symbols, whose names are legible
+MovementId = Annotated[int, Query(description="Id of a movement, as in `/api/library/movements`.")]
+
+
 class OverlayOut(BaseModel):
     """An example laid over the movement, see `kineme.recognition.explanation.Overlay`."""
 
@@ -405,3 +411,38 @@ def explain(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
     """The movement over its nearest example and over the runner-up, as `kineme why` draws it."""
     movement = records.trajectory(body.times, body.positions)
     return studio.library.recognize(movement, body.error_rate).explain().to_dict()
+
+
+@recognition_router.get("/compare", response_model=WhyOut, summary="Compare two movements of the library")
+def compare_stored(studio: Reads, first: MovementId, second: MovementId) -> dict[str, Any]:
+    """The second laid over the first, where they differ, and a sentence, as `kineme.recognition.compare` gives them."""
+    studio.check_movements([first, second])
+    movement, other = studio.library.movements(ids=[first, second])
+    return compare(movement, other, studio.library.specification.recognizer()).to_dict()
+
+
+class ConfusionOut(BaseModel):
+    """Names, how many movements of each (row) were taken for each (column), and how many are right, in words."""
+
+    names: list[str]
+    counts: list[list[int]]
+    in_words: str
+
+
+@recognition_router.get("/confusion", response_model=ConfusionOut, summary="Which symbols are taken for which")
+def mistakes(studio: Reads) -> dict[str, Any]:
+    """Up to 300 movements of the forty largest symbols, each recognized by those of which it is none."""
+    return studio.cached("confusion", lambda: _mistakes(studio))
+
+
+def _mistakes(studio: Studio) -> dict[str, Any]:
+    symbols = sorted(studio.view().symbols.values(), key=lambda symbol: (-len(symbol), symbol.name))
+    symbols = [symbol for symbol in symbols if len(symbol) > 1][:_MOST_CONFUSED]
+    if len(symbols) < 2:
+        raise SpecificationError("expected two symbols of two movements or more, got fewer; draw each of two again")
+    share = _CONFUSED // len(symbols)
+    ids = [symbol.members[evenly_spaced(len(symbol), share)] for symbol in symbols]
+    labels = [symbol.name for symbol, members in zip(symbols, ids, strict=True) for _ in members]
+    movements = studio.library.movements(ids=np.concatenate(ids))
+    counted = confusion(movements, labels, recognizer=studio.library.specification.recognizer())
+    return {"names": counted.labels, "counts": counted.counts[:, :-1].tolist(), "in_words": counted.in_words}

@@ -1,9 +1,12 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
+import { get } from "../parts/api.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { breakable, button, byId, counted, fill, make } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
+import { Overlay } from "../parts/overlay.js";
 import { thumbnail } from "../parts/thumbnails.js";
+import { tried } from "../parts/toasts.js";
 import { show } from "../parts/views.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { Members } from "./members.js";
@@ -101,11 +104,22 @@ export class SymbolPanel {
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
-    const hint = `Choose some to ${symbol ? "split, rename" : "name"} or delete.`;
+    const hint = `Choose two to compare, or some to ${symbol ? "split, rename" : "name"} or delete.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
-    const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
-      for (const act of acts) act.disabled = !members.ids().length;
-      count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : hint;
+    const picture = make("canvas", { class: "compared", role: "img", "aria-label": "Both, one over the other" });
+    const overlay = new Overlay(picture);
+    picture.hidden = true;
+    const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", async () => {
+      const ids = members.ids();
+      for (const act of acts) act.disabled = !ids.length;
+      count.textContent = ids.length ? `${counted(ids.length, "movement")} chosen` : hint;
+      picture.hidden = true;
+      if (ids.length !== 2) return;
+      const both = await tried(() => get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
+      if (!both || String(members.ids()) !== String(ids)) return; // others are chosen by now
+      count.textContent = `${both.in_words}.`;
+      picture.hidden = false;
+      overlay.show({ ...both.nearest, drawn: both.path });
     });
     const acts = library().read_only ? [] : actions(symbol, members);
     for (const act of acts) act.disabled = true;
@@ -116,7 +130,7 @@ export class SymbolPanel {
       button("×", () => this.close(), close),
       ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]),
       make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")),
-      ...(acts.length ? [count, bar] : []),
+      ...(acts.length ? [count, picture, bar] : []),
       members.element,
     );
   }

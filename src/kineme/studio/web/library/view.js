@@ -6,6 +6,7 @@ import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chosen, showCards } from "./cards.js";
+import { showConfusion } from "./confusion.js";
 import { showHistory } from "./history.js";
 import { MovementMap } from "./map.js";
 import { showProposals } from "./proposals.js";
@@ -64,12 +65,15 @@ export function startLibrary() {
     chose();
     map.load();
     showProposals();
+    byId("confusion").hidden = library().symbols.length < 2;
+    showConfusion();
     showHistory();
   };
   startFinding(byId("find-symbol"), cards, () => document.querySelector(".card-open"));
   byId("merge").addEventListener("click", mergeChosen);
   byId("show-unlabeled").addEventListener("click", () => open(""));
   byId("history").addEventListener("toggle", showHistory);
+  byId("confusion").addEventListener("toggle", showConfusion);
   onShow("library", all);
   onLibrary(all);
 }

@@ -84,7 +84,7 @@ export const breakable = (name) =>
  *     "show-unlabeled"|"spot"|"spot-page"|"undo"|"undo-span"|"zoom-in"|"zoom-out", HTMLButtonElement>
  *   & Record<"canvas"|"draw-canvas"|"map"|"move-canvas"|"nearest"|"plot-acceleration"|"plot-speed"|"shape"|
  *     "stage"|"timeline-canvas"|"wand-canvas", HTMLCanvasElement>
- *   & Record<"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
+ *   & Record<"confusion"|"history"|"live-source"|"mirror"|"move-advanced"|"pick-part"|"robot-preflight"|
  *     "why", HTMLDetailsElement>
  *   & Record<"ask"|"importing"|"keys"|"phone", HTMLDialogElement>
  *   & Record<"channels"|"formulations"|"manner"|"styles", HTMLFieldSetElement>
@@ -93,6 +93,6 @@ export const breakable = (name) =>
  *     "tilt"|"time"|"turn"|"video-start", HTMLInputElement>
  *   & Record<"camera"|"export-format"|"formulation"|"robot-arm"|"robot-format"|"robot-what"|"save-format"|
  *     "tables", HTMLSelectElement>
- *   & Record<"importing-rows"|"spans", HTMLTableElement>
+ *   & Record<"confusion-table"|"importing-rows"|"spans", HTMLTableElement>
  *   & Record<"video", HTMLVideoElement>} Elements
  */

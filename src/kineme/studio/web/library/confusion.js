@@ -1,0 +1,32 @@
+// Which names are mixed up: each movement recognized by the others.
+import { get } from "../parts/api.js";
+import { byId, fill, make } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+
+let version = -1; // of the library that is shown
+
+/** Once it is asked for: it takes seconds. */
+export async function showConfusion() {
+  if (!byId("confusion").open || version === library().version) return;
+  version = library().version;
+  byId("confusion-text").textContent = "Each movement is recognized by the others …";
+  fill(byId("confusion-table"));
+  const answer = await tried(() => get("/api/confusion"));
+  byId("confusion-text").textContent = answer
+    ? `${answer.in_words}. Rows: names; columns: what they are taken for.`
+    : "";
+  if (!answer) return;
+  const { names, counts } = answer;
+  const head = names.map((/** @type {string} */ name) => make("th", { scope: "col" }, make("span", {}, name)));
+  const rows = names.map((/** @type {string} */ name, /** @type {number} */ i) => {
+    const sum = counts[i].reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0);
+    const cells = counts[i].map((/** @type {number} */ n, /** @type {number} */ j) => {
+      const cell = make("td", { class: i === j ? "right" : "wrong" }, n ? String(n) : "");
+      cell.style.setProperty("--share", String(n / sum));
+      return cell;
+    });
+    return make("tr", {}, make("th", { scope: "row" }, name), ...cells);
+  });
+  fill(byId("confusion-table"), make("tr", {}, make("td", {}), ...head), ...rows);
+}
