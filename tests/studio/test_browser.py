@@ -292,6 +292,24 @@ LOADED_TWICE = """async () => {
 }"""
 
 
+def test_two_chosen_movements_are_compared_and_names_that_are_mixed_up_counted(opened, studio, tmp_path):
+    page = opened(studio(make_letters(tmp_path / "letters", shown=3)), "library")
+    page.locator(".card-open").first.click()
+    wait_until(page, "document.querySelectorAll('.member').length === 3")
+    page.locator(".member").nth(0).click()
+    assert page.is_hidden(".compared")
+    other = center(page, ".member >> nth=2")
+    page.locator(".member").nth(1).click()
+    wait_until(page, "!document.querySelector('.compared').hidden")
+    assert center(page, ".member >> nth=2") == other  # what can be chosen next does not move away
+    assert re.search(r" beside .* of the path, by up to \d+ % of its size", page.inner_text(".compared"))
+    page.locator(".member").nth(2).click()
+    assert page.is_hidden(".compared")
+    page.click("#confusion summary")
+    wait_until(page, "document.getElementById('confusion-text').textContent.includes('of 12 movements right')")
+    assert page.locator("#confusion-table .right").all_inner_texts() == ["3"] * 4
+
+
 def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studio, tmp_path):
     running = studio(make_letters(tmp_path / "letters", shown=3))
     page = opened(running, "library")

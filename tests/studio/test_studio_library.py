@@ -22,6 +22,7 @@ from kineme.datasets import EXAMPLES
 from kineme.errors import DataError
 from kineme.library import learn as learning
 from kineme.library.storage.store import Store
+from kineme.recognition import compare, confusion
 from kineme.studio.server import library_routes
 from kineme.studio.server.studio import Studio
 
@@ -372,6 +373,24 @@ def test_an_answer_is_explained_as_in_python(client, folder):
         assert explained[key] == ours[key]
     for role in ("nearest", "runner_up"):
         assert explained[role] == ours[role] | {"similarity": pytest.approx(ours[role]["similarity"], rel=1e-4)}
+
+
+def test_two_movements_are_compared_and_mistakes_counted_as_in_python(client, folder, tmp_path, open_studio):
+    compared = client.get("/api/compare?first=1&second=2").json()
+    counted = client.get("/api/confusion").json()
+    with ActionLibrary(folder, read_only=True) as library:
+        movements, like = library.movements(ids=[1, 2]), library.specification.recognizer()
+        ours = compare(movements[0], movements[1], like)
+        named = [symbol for symbol in library.symbols() if len(symbol) > 1]
+        ids = [member for symbol in named for member in symbol.members]
+        names = [symbol.name for symbol in named for _ in symbol.members]
+        mistakes = confusion(library.movements(ids=ids), names, recognizer=like)
+    assert (compared["in_words"], compared["path"]) == (ours.in_words, ours.to_dict()["path"])
+    assert (tuple(counted["names"]), counted["in_words"]) == (mistakes.labels, mistakes.in_words)
+    assert counted["counts"] == mistakes.counts[:, :-1].tolist()
+    assert client.get("/api/compare?first=1&second=999").status_code == 404
+    answer = open_studio(tmp_path / "new").get("/api/confusion")
+    assert (answer.status_code, "expected two symbols of two movements" in answer.json()["error"]) == (400, True)
 
 
 def test_one_movement_of_one_symbol_is_recognized_again(tmp_path, open_studio):

@@ -106,19 +106,20 @@ export class SymbolPanel {
     panel.classList.add("opened");
     const hint = `Choose two to compare, or some to ${symbol ? "split, rename" : "name"} or delete.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
-    const picture = make("canvas", { class: "compared", role: "img", "aria-label": "Both, one over the other" });
-    const overlay = new Overlay(picture);
-    picture.hidden = true;
+    const canvas = make("canvas", { role: "img", "aria-label": "Both, one over the other" });
+    const words = make("figcaption", { class: "small", role: "status" });
+    const compared = make("figure", { class: "compared", hidden: true }, canvas, words);
+    const overlay = new Overlay(canvas);
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", async () => {
       const ids = members.ids();
       for (const act of acts) act.disabled = !ids.length;
       count.textContent = ids.length ? `${counted(ids.length, "movement")} chosen` : hint;
-      picture.hidden = true;
+      compared.hidden = true;
       if (ids.length !== 2) return;
       const both = await tried(() => get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
       if (!both || String(members.ids()) !== String(ids)) return; // others are chosen by now
-      count.textContent = `${both.in_words}.`;
-      picture.hidden = false;
+      words.textContent = `${both.in_words}.`;
+      compared.hidden = false;
       overlay.show({ ...both.nearest, drawn: both.path });
     });
     const acts = library().read_only ? [] : actions(symbol, members);
@@ -130,8 +131,9 @@ export class SymbolPanel {
       button("×", () => this.close(), close),
       ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]),
       make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")),
-      ...(acts.length ? [count, picture, bar] : []),
+      ...(acts.length ? [count, bar] : []),
       members.element,
+      compared,
     );
   }
 
