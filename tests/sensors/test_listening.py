@@ -214,7 +214,7 @@ def test_the_symbol_of_a_movement_that_ended_waits_for_no_recognition(library):
     assert calls[-1] == heard.symbols[-1].end  # the rest is no part of it
 
 
-@settings(max_examples=examples(20), deadline=None)
+@settings(max_examples=examples(6, 60), deadline=None)
 @given(st.data())
 def test_nothing_that_comes_raises(library, data):
     heard = Heard(library)

@@ -13,6 +13,7 @@ import kineme
 from browsing import Pages, wait_until
 from kineme.datasets import EXAMPLES, load_example
 from kineme.studio.page.write_page import write_page
+from soaking import slow
 
 VIEWS = ("draw", "library", "move", "recordings", "robot")
 MOST = 20  # enabled controls on a first screen
@@ -231,7 +232,7 @@ def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, t
     assert page.evaluate("kineme.state.answer.ranked[0].label") == "C"
 
 
-@pytest.mark.parametrize("width", [390, 820, 1440])
+@pytest.mark.parametrize("width", [390, slow(820), 1440])
 def test_a_first_screen_has_few_controls(opened, tabs, examples, tmp_path, width):
     many = {}
     for name, folder in (("new", tmp_path / "new"), *((name, examples / name) for name in EXAMPLES)):

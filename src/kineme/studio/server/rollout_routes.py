@@ -17,7 +17,6 @@ from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS, encode_movement
 from kineme.library.grounding import prototype_of
 from kineme.library.storage import read
-from kineme.recognition.differences import compare, confusion
 from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
 from kineme.studio.server.studio import Reads, Studio
@@ -416,6 +415,8 @@ def explain(studio: Reads, body: RecognizeRequest) -> dict[str, Any]:
 @recognition_router.get("/compare", response_model=WhyOut, summary="Compare two movements of the library")
 def compare_stored(studio: Reads, first: MovementId, second: MovementId) -> dict[str, Any]:
     """The second laid over the first, where they differ, and a sentence, as `kineme.recognition.compare` gives them."""
+    from kineme.recognition.differences import compare  # scikit-learn, which the studio starts without
+
     studio.check_movements([first, second])
     movement, other = studio.library.movements(ids=[first, second])
     return compare(movement, other, studio.library.specification.recognizer()).to_dict()
@@ -436,6 +437,8 @@ def mistakes(studio: Reads) -> dict[str, Any]:
 
 
 def _mistakes(studio: Studio) -> dict[str, Any]:
+    from kineme.recognition.differences import confusion
+
     symbols = sorted(studio.view().symbols.values(), key=lambda symbol: (-len(symbol), symbol.name))
     symbols = [symbol for symbol in symbols if len(symbol) > 1][:_MOST_CONFUSED]
     if len(symbols) < 2:

@@ -104,7 +104,7 @@ export class SymbolPanel {
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
-    const hint = `Choose two to compare, or some to ${symbol ? "split, rename" : "name"} or delete.`;
+    const hint = `Choose two to compare, or some to ${symbol ? "change" : "name"}.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
     const canvas = make("canvas", { role: "img", "aria-label": "Both, one over the other" });
     const words = make("figcaption", { class: "small", role: "status" });
