@@ -18,22 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
+from kineme.library.storage import schema
 from kineme.library.storage.channels import other_columns
 from kineme.library.storage.rows import Database, Row, has_table, parsed, row_name, sealed
-from kineme.library.storage.schema import (
-    ALL_GOOD,
-    BLOBS,
-    CHECKS,
-    COLUMNS,
-    COUNTED,
-    CREATE,
-    GOOD,
-    LARGEST_ID,
-    LATER_META,
-    META,
-    MIGRATIONS,
-    RETURNS,
-)
 from kineme.library.storage.store import Store
 from kineme.validation import Array
 
@@ -51,7 +38,7 @@ def _version(rows: Sequence[Row]) -> Strange:
             yield key, "a rejection without its list of movements"
         elif action == "discover" and not _is_discovery(detail):
             yield key, "proposals without their names, sizes, medoids, certainties and movements"
-        elif action in RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
+        elif action in schema.RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
             yield key, f"an action {action} without the earlier version that it returned to"
 
 
@@ -108,7 +95,7 @@ CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
 def samples(connection: Database, rows: Sequence[Row], n_dims: int) -> Strange:
     """Check ascending rows of the table `raw` like the functions of `CONTENTS`, beside the rows of movements."""
     yield from _not_finite(rows, np.float64, np.float32)
-    query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
+    query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {schema.GOOD['movement']}"
     about = {row[0]: row[1:] for row in connection.execute(query, (rows[0][0], rows[-1][0]))}
     fitting = [row for row in rows if row[0] in about and len(row[2]) == 4 * n_dims * about[row[0]][0]]
     if not fitting:
@@ -188,7 +175,7 @@ def problems_of(connection: Database, store: Store, *, pages: bool) -> list[Prob
     """Return the problems of the rows that a connection sees, which are those of a store."""
     checks = [
         *((_structure(connection),) if pages else ()),
-        *(_rows(connection, table, store) for table in COLUMNS if has_table(connection, table)),
+        *(_rows(connection, table, store) for table in schema.COLUMNS if has_table(connection, table)),
         _without(connection, _REFERENCES),
         _without(connection, _COMPLETE),
         _completeness(connection),
@@ -240,7 +227,7 @@ def _rows(connection: Database, table: str, store: Store) -> Iterator[Problem]:
         good: list[Row] = []
         size = 0
         scan = getattr(connection, "scan", connection.execute)
-        for row in scan(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
+        for row in scan(f"SELECT {', '.join(schema.COLUMNS[table])}, crc, {schema.ALL_GOOD[table]} FROM {table}"):
             if not row[-1] or not sealed(table, row[:-1]):
                 yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
                 continue
@@ -262,9 +249,9 @@ def _broken(table: str, row: Row) -> list[Problem]:
 
 def _strange(connection: Database, table: str, key: Any) -> Iterator[Problem]:
     """Return the problems of a row with invalid values."""
-    checks = CHECKS[table]
+    checks = schema.CHECKS[table]
     fits = ", ".join(f"({check.condition}) IS TRUE" for check in checks.values())
-    row = connection.execute(f"SELECT {fits} FROM {table} WHERE {COLUMNS[table][0]} IS ?", (key,)).fetchone()
+    row = connection.execute(f"SELECT {fits} FROM {table} WHERE {schema.COLUMNS[table][0]} IS ?", (key,)).fetchone()
     for (column, check), good in zip(checks.items(), row or (), strict=False):
         if not good:
             yield _problem(table, key, f"{column} is not {check.words}")
@@ -282,7 +269,7 @@ def _contents(connection: Database, table: str, rows: list[Row], store: Store) -
 
 def _one_by_one(connection: Database, table: str) -> Iterator[Problem]:
     """Return the movements whose rows cannot be read, in a table that cannot be read as a whole."""
-    if table not in BLOBS:
+    if table not in schema.BLOBS:
         return
     for (key,) in connection.execute("SELECT id FROM movement").fetchall():
         try:
@@ -299,10 +286,9 @@ def _completeness(connection: Database) -> Iterator[Problem]:
         if last != n:
             yield Problem(table, None, f"table {table}: expected {last} rows, numbered from 1, got {n}")
     keys = {key for (key,) in connection.execute("SELECT key FROM meta").fetchall()}
-    if strange := keys - META - LATER_META:
-        yield Problem(
-            "meta", min(strange), f"table meta: expected nothing but {sorted(META | LATER_META)}, got {min(strange)!r}"
-        )
+    allowed = schema.META | schema.LATER_META
+    if strange := keys - allowed:
+        yield Problem("meta", min(strange), f"table meta: expected nothing but {sorted(allowed)}, got {min(strange)!r}")
     if n and "n_dims" not in keys:
         yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
 
@@ -324,21 +310,24 @@ def _without(connection: Database, constraints: Iterable[Constraint]) -> Iterato
 
 #: Each movement has its samples, primitive and features.
 _COMPLETE = [
-    Constraint(table, f"SELECT id FROM movement EXCEPT SELECT movement FROM {table}", "not there") for table in BLOBS
+    Constraint(table, f"SELECT id FROM movement EXCEPT SELECT movement FROM {table}", "not there")
+    for table in schema.BLOBS
 ]
 
 
 def _refers(table: str, column: str, parent: str) -> Constraint:
     """Return the constraint that a column holds the key of a row of another table, or nothing."""
-    there = f"{parent} AS parent ON parent.{COLUMNS[parent][0]} = {table}.{column}"
-    query = f"SELECT {table}.{COLUMNS[table][0]} FROM {table} LEFT JOIN {there} WHERE {table}.{column} IS NOT NULL"
+    there = f"{parent} AS parent ON parent.{schema.COLUMNS[parent][0]} = {table}.{column}"
+    query = (
+        f"SELECT {table}.{schema.COLUMNS[table][0]} FROM {table} LEFT JOIN {there} WHERE {table}.{column} IS NOT NULL"
+    )
     words = f"refers to a row of table {parent} that is not there"
-    return Constraint(table, f"{query} AND parent.{COLUMNS[parent][0]} IS NULL", words)
+    return Constraint(table, f"{query} AND parent.{schema.COLUMNS[parent][0]} IS NULL", words)
 
 
 _REFERENCES = [
     _refers(created[1], column, parent)
-    for statement in (*CREATE, *(later for statements in MIGRATIONS.values() for later in statements))
+    for statement in (*schema.CREATE, *(later for statements in schema.MIGRATIONS.values() for later in statements))
     if (created := re.match(r"CREATE TABLE (\w+)", statement))
     for column, parent in re.findall(r"(\w+) INTEGER[^,]*?REFERENCES (\w+)", statement)
 ]
@@ -364,7 +353,7 @@ def _sizes(store: Store) -> list[Constraint]:
     ]
 
 
-_END = f"coalesce(removed, {LARGEST_ID})"
+_END = f"coalesce(removed, {schema.LARGEST_ID})"
 
 
 def _counted(table: str, name: str) -> Constraint:
@@ -401,12 +390,12 @@ def _within(table: str, column: str, owners: str, whose: str) -> Constraint:
 
 
 _SYMBOLS = f"(SELECT symbol AS id, min(added) AS added, max({_END}) AS removed FROM symbol_state GROUP BY symbol) AS s"
-_RETURNED = f"SELECT id FROM version WHERE action IN ('{RETURNS[0]}', '{RETURNS[1]}')"
+_RETURNED = f"SELECT id FROM version WHERE action IN ('{schema.RETURNS[0]}', '{schema.RETURNS[1]}')"
 
 #: Constraints on the lifetimes of rows that are valid one by one. A symbol is not there for a while only if it was
 #: deleted, and comes back by the version that takes this back.
 LIVES = (
-    *(_counted(table, name) for table, name in COUNTED.items()),
+    *(_counted(table, name) for table, name in schema.COUNTED.items()),
     _apart("member", "movement", "the movement shows two symbols at a time"),
     _apart("symbol_state", "symbol", "the symbol has two states at a time"),
     _apart(

@@ -23,6 +23,7 @@ from kineme.studio.server import (
     episode_routes,
     library_routes,
     live_socket,
+    recognition_routes,
     recording_routes,
     robot_routes,
     rollout_routes,
@@ -103,7 +104,7 @@ _THREADS = 8  # requests that are worked on at once, beside movements under way
 ROUTERS = (
     library_routes.router,
     change_routes.router,
-    rollout_routes.recognition_router,
+    recognition_routes.router,
     rollout_routes.router,
     change_routes.proposal_router,
     recording_routes.router,

@@ -131,7 +131,9 @@ class Uploads:
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
             if (preview := result.with_suffix(".json")).exists():
-                self.previews[path.parent.name] = json.loads(preview.read_text(encoding="utf-8"))
+                with self._turn:
+                    if (key := path.parent.name) in self._files:  # of one that is forgotten meanwhile nobody would
+                        self.previews[key] = json.loads(preview.read_text(encoding="utf-8"))
             if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
             if code:
