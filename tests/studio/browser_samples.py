@@ -55,6 +55,33 @@ UNANSWERED = """{
 }"""
 
 
+#: Whether the page says what a whole movement is.
+ANSWERED = "['Sure', 'Probably', 'Looks like', 'New'].includes(document.getElementById('verdict-kind').textContent)"
+
+#: Half a second of a video that the browser itself makes, as text.
+FILM = """async () => {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [64, 48];
+  const context = canvas.getContext("2d");
+  const recorder = new MediaRecorder(canvas.captureStream(20), { mimeType: "video/webm;codecs=vp8" });
+  const parts = [];
+  recorder.ondataavailable = (event) => parts.push(event.data);
+  recorder.start();
+  for (let k = 0; k < 30; k += 1) {
+    context.fillStyle = `hsl(${12 * k} 80% 50%)`;
+    context.fillRect(0, 0, 64, 48);
+    await new Promise((done) => setTimeout(done, 50));
+  }
+  recorder.stop();
+  await new Promise((done) => { recorder.onstop = done; });
+  const bytes = new Uint8Array(await new Blob(parts).arrayBuffer());
+  return btoa([...bytes].map((byte) => String.fromCharCode(byte)).join(""));
+}"""
+
+#: A cell of a span in the table of a recording.
+ROW = "#spans tbody tr:nth-child({}) {}"
+
+
 def show(page, view):
     """Show a view, with what it asks the server for."""
     page.evaluate("view => { location.hash = view; }", view)

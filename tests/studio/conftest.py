@@ -5,7 +5,10 @@ from contextlib import ExitStack, contextmanager
 from shutil import copytree
 
 import pytest
-from studio_samples import BEARER, TOKEN, make_library
+from browser_samples import UNANSWERED
+from studio_samples import BEARER, TOKEN, Served, make_library
+
+from browsing import Pages, wait_until
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # later releases of starlette ask for a later httpx, earlier ones for this one
@@ -56,3 +59,48 @@ def shared_client(studio_of_module):
     """A client of a studio that the tests of a module share: they see what others have stored there."""
     yield studio_of_module
     studio_of_module.cookies.clear()
+
+
+@pytest.fixture(scope="module")
+def pages(browser):
+    """The pages of all tests of a module."""
+    pages = Pages(browser, script=UNANSWERED)
+    yield pages
+    pages.close()
+
+
+@pytest.fixture
+def studio():
+    """A function that serves a library; all are ended."""
+    served = []
+
+    def start(folder, **options):
+        served.append(Served(folder, **options))
+        return served[-1]
+
+    yield start
+    for server in served:
+        server.end()
+
+
+@pytest.fixture
+def allowed():
+    """Beginnings of addresses that pages may ask beside those of the studios."""
+    return "blob:", "data:"
+
+
+@pytest.fixture
+def opened(pages, studio, allowed):  # studios are ended after their pages
+    """A function that opens a studio; at the end nothing went wrong, and nothing was asked from elsewhere."""
+    addresses = set()
+
+    def open_page(studio, view="draw", **options):
+        page = pages.new(**options)
+        addresses.add(studio.address)
+        page.goto(f"{studio.address}/?token={studio.token}" + f"#{view}" * bool(view))
+        wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")
+        wait_until(page, "document.getElementById('status').dataset.state === 'here'")
+        return page
+
+    yield open_page
+    pages.leave(*addresses, *allowed)

@@ -13,13 +13,13 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from browser_samples import (
+    ANSWERED,
     DROP,
     HOSTILE,
     INKED,
     LETTERS,
     PIXELS,
     SHOWN,
-    UNANSWERED,
     Hand,
     center,
     draw,
@@ -32,11 +32,10 @@ from browser_samples import (
 from studio_samples import ROOT, Running, Served, running
 
 import kineme
-from browsing import Pages, wait_until
+from browsing import wait_until
 from soaking import SOAK
 
 WIDTHS = (390, 820, 1440)
-ANSWERED = "['Sure', 'Probably', 'Looks like', 'New'].includes(document.getElementById('verdict-kind').textContent)"
 VIEWS = ("draw", "library", "move", "recordings", "robot")
 
 
@@ -44,45 +43,6 @@ def _free_port():
     """One that no other studio takes while this one is away, as these take the usual one."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         return free.getsockname()[1]
-
-
-@pytest.fixture
-def studio():
-    """A function that serves a library; all are ended."""
-    served = []
-
-    def start(folder):
-        served.append(Served(folder))
-        return served[-1]
-
-    yield start
-    for server in served:
-        server.end()
-
-
-@pytest.fixture(scope="module")
-def pages(browser):
-    """The pages of all tests."""
-    pages = Pages(browser, script=UNANSWERED)
-    yield pages
-    pages.close()
-
-
-@pytest.fixture
-def opened(pages, studio):  # studios are ended after their pages
-    """A function that opens a studio; at the end nothing went wrong, and nothing was asked from elsewhere."""
-    addresses = set()
-
-    def open_page(studio, view="draw", **options):
-        page = pages.new(**options)
-        addresses.add(studio.address)
-        page.goto(f"{studio.address}/?token={studio.token}#{view}")
-        wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")
-        wait_until(page, "document.getElementById('status').dataset.state === 'here'")
-        return page
-
-    yield open_page
-    pages.leave(*addresses, "blob:", "data:")
 
 
 @pytest.fixture(scope="module")

@@ -6,44 +6,15 @@ import base64
 import csv
 
 import pytest
-from browser_samples import HOSTILE, UNANSWERED, center, settle, wait_for_text
+from browser_samples import FILM, HOSTILE, ROW, center, settle, wait_for_text
 from episode_samples import CAMERA, write_drawings
-from studio_samples import Served, make_library
+from studio_samples import make_library
 
-from browsing import Pages, wait_until
-
-#: Half a second of a video that the browser itself makes, as text.
-FILM = """async () => {
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [64, 48];
-  const context = canvas.getContext("2d");
-  const recorder = new MediaRecorder(canvas.captureStream(20), { mimeType: "video/webm;codecs=vp8" });
-  const parts = [];
-  recorder.ondataavailable = (event) => parts.push(event.data);
-  recorder.start();
-  for (let k = 0; k < 30; k += 1) {
-    context.fillStyle = `hsl(${12 * k} 80% 50%)`;
-    context.fillRect(0, 0, 64, 48);
-    await new Promise((done) => setTimeout(done, 50));
-  }
-  recorder.stop();
-  await new Promise((done) => { recorder.onstop = done; });
-  const bytes = new Uint8Array(await new Blob(parts).arrayBuffer());
-  return btoa([...bytes].map((byte) => String.fromCharCode(byte)).join(""));
-}"""
+from browsing import wait_until
 
 #: The last span of the second episode, as the server has it.
 KEPT = "async () => (await (await fetch('/api/episodes')).json()).episodes[1].spans.at(-1)"
 NAMED = "document.querySelectorAll('#spans tbody tr').length"
-ROW = "#spans tbody tr:nth-child({}) {}"
-
-
-@pytest.fixture(scope="module")
-def pages(browser):
-    """The pages of all tests."""
-    pages = Pages(browser, script=UNANSWERED)
-    yield pages
-    pages.close()
 
 
 @pytest.fixture(scope="module")
@@ -56,22 +27,16 @@ def film(pages):
 
 
 @pytest.fixture
-def opened(pages):
-    """A function that opens a studio of recordings; at the end nothing went wrong, and nothing was asked elsewhere."""
-    served = []
+def opened(opened, studio):
+    """A function that opens a studio of recordings."""
 
     def open_page(library, recordings, **options):
-        served.append(Served(library, recordings=recordings))
-        page = pages.new(**options)
-        page.goto(f"{served[-1].address}/?token={served[-1].token}#recordings")
+        page = opened(studio(library, recordings=recordings), "recordings", **options)
         wait_until(page, "!document.getElementById('episodes').hidden")
         settle(page)
         return page
 
-    yield open_page
-    pages.leave(*(studio.address for studio in served), "blob:", "data:")
-    for studio in served:
-        studio.end()
+    return open_page
 
 
 def test_episodes_are_found_corrected_played_and_saved(opened, film, tmp_path):

@@ -6,19 +6,16 @@ import time
 
 import numpy as np
 import pytest
-from browser_samples import UNANSWERED, draw, letters, settle, show, wait_for_text
-from studio_samples import Served
+from browser_samples import ANSWERED, draw, letters, settle, show, wait_for_text
 
 import kineme
-from browsing import Pages, wait_until
+from browsing import wait_until
 from kineme.datasets import EXAMPLES, load_example
 from kineme.studio.page.write_page import write_page
 from soaking import slow
 
 VIEWS = ("draw", "library", "move", "recordings", "robot")
 MOST = 20  # enabled controls on a first screen
-WORDS = ("Sure", "Probably", "Looks like", "New")
-ANSWERED = f"{list(WORDS)}.includes(document.getElementById('verdict-kind').textContent)"
 
 #: What can be used without scrolling, by id or text.
 CONTROLS = """() => [...document.querySelectorAll("button, input, select, textarea, summary, a[href], [tabindex='0']")]
@@ -55,30 +52,22 @@ def strokes(name):
     return kineme.Trajectory(np.linspace(0.0, 1.4, 80), path)
 
 
-@pytest.fixture(scope="module")
-def tabs(browser):
-    tabs = Pages(browser, script=UNANSWERED)
-    yield tabs
-    tabs.close()
+@pytest.fixture
+def allowed():
+    """Pages of one file, too."""
+    return "file:", "blob:"
 
 
 @pytest.fixture
-def opened(tabs):
-    """A function that opens a studio of a folder; at the end nothing went wrong."""
-    studios = []
+def opened(opened, studio):
+    """A function that opens a studio of a folder, by the address that it prints."""
 
     def open_page(folder, **options):
-        studios.append(Served(folder))
-        page = tabs.new(**options)
-        page.goto(f"{studios[-1].address}/?token={studios[-1].token}")
-        wait_until(page, "document.getElementById('status').dataset.state === 'here'")
+        page = opened(studio(folder), "", **options)
         settle(page)
         return page
 
-    yield open_page
-    tabs.leave(*(studio.address for studio in studios), "file:", "blob:")
-    for studio in studios:
-        studio.end()
+    return open_page
 
 
 @pytest.fixture(scope="module")
@@ -190,8 +179,8 @@ def test_what_is_taken_back_is_asked_again(opened, tmp_path):
     wait_until(page, "document.getElementById('library-count').textContent === '10 symbols, 71 movements'")
 
 
-def test_the_page_explains_as_python_does(opened, tabs, examples):
-    page = tabs.new(kind="page")
+def test_the_page_explains_as_python_does(opened, pages, examples):
+    page = pages.new(kind="page")
     page.goto((examples / "letters.html").as_uri())
     wait_until(page, "window.kineme !== undefined")
     assert page.is_hidden("#ranks")
@@ -210,8 +199,8 @@ def test_the_page_explains_as_python_does(opened, tabs, examples):
             assert shown == pytest.approx(overlay.differences.max(), abs=0.04)  # its paths are smoothed more
 
 
-def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, tabs, examples):
-    page = tabs.new(width=390, height=844, has_touch=True, is_mobile=True, kind="phone page")
+def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, pages, examples):
+    page = pages.new(width=390, height=844, has_touch=True, is_mobile=True, kind="phone page")
     page.goto((examples / "letters.html").as_uri())
     wait_until(page, "window.kineme !== undefined")
     for name in "GC":  # both begin where the first one does
@@ -233,7 +222,7 @@ def test_a_second_drawing_by_a_finger_is_a_drawing_until_it_is_dragged(opened, t
 
 
 @pytest.mark.parametrize("width", [390, slow(820), 1440])
-def test_a_first_screen_has_few_controls(opened, tabs, examples, tmp_path, width):
+def test_a_first_screen_has_few_controls(opened, pages, examples, tmp_path, width):
     many = {}
     for name, folder in (("new", tmp_path / "new"), *((name, examples / name) for name in EXAMPLES)):
         page = opened(folder, width=width)
@@ -245,7 +234,7 @@ def test_a_first_screen_has_few_controls(opened, tabs, examples, tmp_path, width
             draw(page, letters("GShape")[0])
             wait_until(page, ANSWERED)
             many[name, "answered"] = page.evaluate(CONTROLS)
-    page = tabs.new(width=width, height=900, kind="page")
+    page = pages.new(width=width, height=900, kind="page")
     page.goto((examples / "letters.html").as_uri())
     wait_until(page, "window.kineme !== undefined")
     many["letters", "page"] = page.evaluate(CONTROLS)

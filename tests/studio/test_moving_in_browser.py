@@ -6,10 +6,10 @@ import csv
 
 import numpy as np
 import pytest
-from browser_samples import INKED, UNANSWERED, center, make_letters, settle
+from browser_samples import INKED, center, make_letters, settle
 from studio_samples import Served
 
-from browsing import Pages, wait_until
+from browsing import wait_until
 
 HANDLES = "document.querySelectorAll('#handles .handle').length"
 MOST_CONTROLS = 20
@@ -28,14 +28,6 @@ GOAL = """() => {
 
 
 @pytest.fixture(scope="module")
-def pages(browser):
-    """The pages of all tests."""
-    pages = Pages(browser, script=UNANSWERED)
-    yield pages
-    pages.close()
-
-
-@pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A studio of letters that no test changes."""
     studio = Served(make_letters(tmp_path_factory.mktemp("letters") / "letters"), read_only=True)
@@ -44,18 +36,15 @@ def served(tmp_path_factory):
 
 
 @pytest.fixture
-def opened(pages, served):
-    """A function that opens a view; at the end nothing went wrong, and nothing was asked from elsewhere."""
+def opened(opened, served):
+    """A function that opens a view of that studio."""
 
     def open_page(view, **options):
-        page = pages.new(**options)
-        page.goto(f"{served.address}/?token={served.token}#{view}")
-        wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")
+        page = opened(served, view, **options)
         settle(page)
         return page
 
-    yield open_page
-    pages.leave(served.address, "blob:", "data:")
+    return open_page
 
 
 def grip(page, above=0.3):

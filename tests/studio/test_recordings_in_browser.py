@@ -6,12 +6,11 @@ import csv
 
 import numpy as np
 import pytest
-from browser_samples import UNANSWERED, center, settle, wait_for_text
+from browser_samples import FILM, ROW, center, settle, wait_for_text
 from episode_samples import drawn
-from studio_samples import Served, make_library
-from test_episodes_in_browser import FILM, ROW
+from studio_samples import make_library
 
-from browsing import Pages, wait_until
+from browsing import wait_until
 
 #: How many pixels of the picture of the shape are painted.
 INKED = """() => {
@@ -23,29 +22,18 @@ PICTURE = """(id) => document.getElementById(id).toDataURL()"""
 SPANS = "document.querySelectorAll('#spans tbody tr').length"
 
 
-@pytest.fixture(scope="module")
-def pages(browser):
-    pages = Pages(browser, script=UNANSWERED)
-    yield pages
-    pages.close()
-
-
 @pytest.fixture
-def opened(pages, tmp_path):
+def opened(opened, studio, tmp_path):
     """A function that opens the view Recordings of a studio."""
-    served = []
 
     def open_page(**options):
-        served.append(Served(make_library(tmp_path / f"actions{len(served)}")))
-        page = pages.new(**options)
-        page.goto(f"{served[-1].address}/?token={served[-1].token}#recordings")
+        page = opened(
+            studio(make_library(tmp_path / f"actions{len(list(tmp_path.iterdir()))}")), "recordings", **options
+        )
         settle(page)
         return page
 
-    yield open_page
-    pages.leave(*(studio.address for studio in served), "blob:", "data:")
-    for studio in served:
-        studio.end()
+    return open_page
 
 
 def _file(name, *kinds, heads="", times=False):

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from browser_samples import draw, letters, make_letters, settle, show
-from test_browser import UNANSWERED, Served
+from browser_samples import UNANSWERED, draw, letters, make_letters, settle, show
+from studio_samples import Served
 
 import kineme
 from browsing import Pages, wait_until

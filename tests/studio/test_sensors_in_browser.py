@@ -12,35 +12,27 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from browser_samples import PIXELS, SHOWN, UNANSWERED, Hand, center, letters, make_letters, wait_for_text
-from studio_samples import BEARER, ROOT, Served
+from browser_samples import ANSWERED, PIXELS, SHOWN, Hand, center, letters, make_letters, wait_for_text
+from studio_samples import BEARER, ROOT
 
 import kineme
-from browsing import Pages, wait_until
+from browsing import wait_until
 
-ANSWERED = "['Sure', 'Probably', 'Looks like', 'New'].includes(document.getElementById('verdict-kind').textContent)"
 FIRST = ".rank:first-child .rank-name"
 REACH = 1.6  # of the phone as a wand, heights of the canvas for a turn by 1 rad
 
 
-@pytest.fixture(scope="module")
-def pages(browser):
-    pages = Pages(browser, script=UNANSWERED)
-    yield pages
-    pages.close()
+@pytest.fixture
+def allowed():
+    """The server of the phone, too."""
+    return "https://127.0.0.1:", "data:"
 
 
 @pytest.fixture
-def opened(pages, tmp_path):
-    """A studio of letters and its page; at the end nothing went wrong, and nothing was asked from elsewhere."""
-    studio = Served(make_letters(tmp_path / "letters"))
-    page = pages.new()
-    page.goto(f"{studio.address}/?token={studio.token}#draw")
-    wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")
-    wait_until(page, "document.getElementById('status').dataset.state === 'here'")
-    yield studio, page
-    pages.leave(studio.address, "https://127.0.0.1:", "data:")
-    studio.end()
+def opened(opened, studio, tmp_path):
+    """A studio of letters and its page."""
+    served = studio(make_letters(tmp_path / "letters"))
+    return served, opened(served)
 
 
 def _path(n=60, shape="GShape"):
