@@ -140,7 +140,7 @@ def _draw(page: Any, movement: kineme.Trajectory) -> None:
         time.sleep(max(0.0, begin + due - time.perf_counter()))
         page.mouse.move(x, y)
     page.mouse.up()
-    _until(page, "['This is', 'The answer'].includes(document.getElementById('verdict-kind').textContent)")
+    _until(page, "!document.getElementById('why').hidden")  # shown with the answer to the whole movement
 
 
 def _drag(page: Any, seconds: float) -> dict[str, Any]:
