@@ -234,6 +234,7 @@ def test_a_first_screen_has_few_controls(opened, pages, examples, tmp_path, widt
             draw(page, letters("GShape")[0])
             wait_until(page, ANSWERED)
             many[name, "answered"] = page.evaluate(CONTROLS)
+        page.close()  # an arm that moves in one page keeps the next one waiting
     page = pages.new(width=width, height=900, kind="page")
     page.goto((examples / "letters.html").as_uri())
     wait_until(page, "window.kineme !== undefined")
