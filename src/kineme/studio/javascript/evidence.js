@@ -7,22 +7,6 @@ import { pairDistances, squaredDistances } from "./distances.js";
 import { kernelLogs, logAverages } from "./recognition.js";
 import { align, rotates } from "./rotation.js";
 
-/**
- * @typedef {Object} Numbers those of kineme.recognition.early, in the header
- * @property {number} compared hypotheses compared pair by pair, and the best one of each class
- * @property {number} widened widths of positions where they choose those
- * @property {number} rotation weight of the rotation prior
- * @property {number} speed_spread of the logarithm of the speed at the end
- * @property {number} progress exponent of the density of progress
- * @property {number} power of the similarity of whole movements
- * @property {number} negligible without its exp(-negligible) of the largest evidence a movement is not compared whole
- * @property {number} prior_odds logarithm of the odds that a movement is over before its speed is known
- * @property {number} most_odds
- * @property {number} log_unknown logarithm of the evidence for an unknown movement
- * @property {number} temper exponent of the shares
- * @property {number} explaining a movement explains a beginning at about one in so many values of progress
- */
-
 /** Logarithms of the densities of size, duration, timing, speed at the end, and progress, for each hypothesis. */
 function logPriors(stored, begun, duration) {
   const { prefixes, progress, S, logLengths, logDurations, timingSquares } = stored;
@@ -44,7 +28,7 @@ function logPriors(stored, begun, duration) {
   });
 }
 
-/** Hypotheses to be compared pair by pair: the best ones, and the best of each class. @returns {number[]} */
+/** Hypotheses to be compared pair by pair: the best ones, and the best of each class. */
 function choose(rough, first, G, compared) {
   const n = rough.length;
   if (n <= compared) return Array.from(rough, (_, h) => h);

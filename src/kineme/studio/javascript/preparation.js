@@ -8,18 +8,9 @@ const MIN_SAMPLES = 4;
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
 /**
- * @typedef {Object} Movement
- * @property {Float64Array} times [s], rising
- * @property {Float64Array} positions T samples of d numbers, one after the other
- * @property {number} d
- */
-
-/**
  * A movement, checked.
- * @param {ArrayLike<number>} times
  * @param {ArrayLike<ArrayLike<number>>|ArrayLike<number>} positions T samples of d numbers
- * @param {number} d
- * @returns {Movement}
+ * @returns {TimedPositions}
  */
 export function movement(times, positions, d) {
   /** @type {(number|number[])[]} */
@@ -41,13 +32,13 @@ export function movement(times, positions, d) {
   return { times: t, positions: flat, d };
 }
 
-/** One dimension minus its first number. @param {Movement} movement @param {number} k */
+/** One dimension minus its first number. @param {TimedPositions} movement */
 function column(movement, k) {
   const { positions, d } = movement;
   return Float64Array.from(movement.times, (_, j) => positions[j * d + k] - positions[k]);
 }
 
-/** Stamps of which consecutive ones are at least `CLOSEST` of the mean step apart. @param {Float64Array} times */
+/** Stamps of which consecutive ones are at least `CLOSEST` of the mean step apart. */
 function spread(times) {
   const last = times.length - 1;
   const least = (CLOSEST * (times[last] - times[0])) / last;
@@ -62,10 +53,8 @@ function spread(times) {
 /**
  * The smoothing spline at n even times, minus the first recorded position: d rows of n numbers.
  * It minimizes `sum_j (x_j - g(u_j))^2 + lam * integral g''(u)^2 du` (Reinsch 1967), with the lam of `cutoff` cycles.
- * @param {Movement} movement
+ * @param {TimedPositions} movement
  * @param {number|null} cutoff none: an interpolating spline
- * @param {number} n
- * @returns {Float64Array}
  */
 export function evenPath(movement, cutoff, n) {
   if (cutoff === null) return splinePath(movement, n);
@@ -130,9 +119,7 @@ function evaluate(v, x, m, n) {
 
 /**
  * The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers.
- * @param {Movement} movement
- * @param {number} n
- * @returns {Float64Array}
+ * @param {TimedPositions} movement
  */
 export function splinePath(movement, n) {
   const apart = separated(movement);
@@ -171,7 +158,7 @@ function bends(v, x) {
 
 /**
  * The movement with each group of close samples replaced by its mean; usually there is none.
- * @param {Movement} movement
+ * @param {TimedPositions} movement
  */
 function separated(movement) {
   const { times, positions, d } = movement;
@@ -220,9 +207,7 @@ function joined(times, gaps, step) {
 /**
  * Arc-length phase of an even path, from 0 to 1, blended with time.
  * @param {ArrayLike<number>} path d rows of n numbers
- * @param {number} d
  * @param {number} [share] of the arc length
- * @returns {Float64Array}
  */
 export function arcLengthPhase(path, d, share = 1) {
   const n = path.length / d;

@@ -13,7 +13,7 @@ export function openPrimitive(text) {
   const end = rollout(snapshot, primitive).velocities.at(-1);
   return {
     ...primitive,
-    /** @param {import("./rollout.js").Wish} [wish] */
+    /** @param {Wish} [wish] */
     rollout: (wish = {}) => {
       const { duration = primitive.duration } = wish;
       return rollout(snapshot, primitive, {

@@ -37,17 +37,6 @@ function isotropic(now, learned, extents) {
   return now.map(() => ratio);
 }
 
-/**
- * @typedef {Object} Primitive
- * @property {ArrayLike<number>} weights d rows of N, times the scale of the formulation
- * @property {number[]} start
- * @property {number[]} goal
- * @property {number[]} velocity per second
- * @property {number} duration [s]
- * @property {number[]} extents
- * @property {string} formulation
- */
-
 /** Elements of exp(A h) with A = [[0, 1], [-K, -D]], row by row. */
 function transition(K, D, h) {
   const a = 0.5 * D;
@@ -113,9 +102,7 @@ function withAcceleration({ n_basis: N, K, D }, state, values) {
 /**
  * The decode matrix of a formulation at n even times: x - x0 as a map of (W, g - x0, v0), with v0 = dx/du.
  * @param {Object} how the header's movements
- * @param {string} formulation
- * @param {number} n
- * @returns {Float64Array[]} states at each time, x, x' and x''
+ * @returns states at each time, x, x' and x''
  */
 function decoder(how, formulation, n) {
   const { n_basis: N } = how;
@@ -144,12 +131,10 @@ function cachedDecoder(how, formulation, n) {
 
 /**
  * The primitive of class c, in the formulation of the library or in another one.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @param {number} c
- * @param {string} [formulation]
+ * @param {Snapshot} snapshot
  * @returns {Primitive}
  */
-export function primitiveOf({ header, arrays }, c, formulation) {
+export function primitiveOf({ header, arrays }, c, formulation = header.movements.formulation) {
   const how = header.movements;
   const d = how.n_dims;
   const part = (name, size) => arrays[name].subarray(c * size, (c + 1) * size);
@@ -158,7 +143,7 @@ export function primitiveOf({ header, arrays }, c, formulation) {
   const weights = Float64Array.from(part("weights", d * how.n_basis));
   const duration = arrays["primitive durations"][c];
   const own = { weights, start, goal, velocity, duration, extents, formulation: how.formulation };
-  return formulation === undefined ? own : inFormulation({ header, arrays }, own, formulation);
+  return inFormulation({ header, arrays }, own, formulation);
 }
 
 /** The same path in another formulation: what its goal adds is another, and the weights make up for it. */
@@ -190,8 +175,8 @@ function fitted(arrays, { n_basis: N, n_points: n }, y) {
 
 /**
  * Learn a movement; see `kineme.DMP.learn`.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @param {import("./preparation.js").Movement} movement
+ * @param {Snapshot} snapshot
+ * @param {TimedPositions} movement
  * @returns {Primitive}
  */
 export function encode({ header, arrays }, movement) {
@@ -203,7 +188,7 @@ export function encode({ header, arrays }, movement) {
   const pull = cachedDecoder(how, how.formulation, n).map((state) => state[how.n_basis]);
   const at = (t) => Array.from({ length: d }, (_, k) => positions[t * d + k]);
   const [start, goal] = [at(0), at(times.length - 1)];
-  const duration = times[times.length - 1] - times[0];
+  const duration = times.at(-1) - times[0];
   const weights = new Float64Array(d * how.n_basis);
   const velocity = start.map((_, k) => {
     const [own, v0] = fitted(
@@ -224,18 +209,8 @@ export function encode({ header, arrays }, movement) {
 }
 
 /**
- * @typedef {Object} Wish with an end velocity the goal is met exactly, as with via points
- * @property {number[]} [start]
- * @property {number[]} [goal]
- * @property {number} [duration]
- * @property {[number, number[]][]} [via]
- * @property {number[]} [endVelocity]
- * @property {number} [samples]
- */
-
-/**
  * The movement to a new start and goal; see `kineme.dmp.Primitives.rollout`.
- * @param {import("./arrays.js").Snapshot} snapshot
+ * @param {Snapshot} snapshot
  * @param {Primitive} primitive
  * @param {Wish} [wish]
  * @returns {{times: Float64Array, positions: number[][], velocities: number[][], accelerations: number[][]}}

@@ -7,10 +7,7 @@ import { movement } from "./preparation.js";
 import { knownClasses, recognize } from "./recognition.js";
 import { encode, FORMULATIONS, inFormulation, primitiveOf, rollout } from "./rollout.js";
 
-/**
- * A library that recognizes and moves.
- * @param {string|Object} text a snapshot, see kineme.studio.snapshot
- */
+/** A library that recognizes and moves. @param {string|Object} text a snapshot, see kineme.studio.snapshot */
 export function open(text) {
   const snapshot = unpack(text);
   const { header } = snapshot;

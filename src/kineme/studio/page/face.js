@@ -146,7 +146,7 @@ const placeOf = (event) => {
   return [event.clientX - left, event.clientY - top];
 };
 
-/** What moves is another; the note says why it cannot be so. @param {string} [note] */
+/** What moves is another; the note says why it cannot be so. */
 function moved(note = "") {
   stage.board.draw();
   if (!state.held) tellMoved();
@@ -163,7 +163,7 @@ function startDragging() {
   canvas.focus({ preventScroll: true });
 }
 
-/** Take hold of a point of what moves. @param {PointerEvent} event */
+/** Take hold of a point of what moves. */
 function hold(event) {
   if (state.held || state.stroke || !state.drags) return;
   state.played = null;
@@ -179,7 +179,7 @@ function hold(event) {
   if (held && drag(canvas, event, (now) => state.moving && go(now), end)) state.held = held;
 }
 
-/** @type {import("../web/parts/stroke.js").Hearer} */
+/** @type {Hearer} */
 const hearer = {
   begins: () => {
     if (state.held || !header.early) return false;
@@ -257,16 +257,16 @@ function start() {
       canvas.classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
   });
   canvas.addEventListener("keydown", key);
-  byId("clear").addEventListener("click", () => become({}));
-  byId("play").addEventListener("click", play);
-  byId("drag").addEventListener("click", startDragging);
-  byId("save").addEventListener("click", save);
-  byId("formulation").addEventListener("change", () => update({ formulation: byId("formulation").value }));
+  byId("clear").onclick = () => become({});
+  byId("play").onclick = play;
+  byId("drag").onclick = startDragging;
+  byId("save").onclick = save;
+  byId("formulation").onchange = () => update({ formulation: byId("formulation").value });
   for (const id of ["turn", "tilt"])
-    byId(id).addEventListener("input", () => {
+    byId(id).oninput = () => {
       const angles = [Number(byId("turn").value), Number(byId("tilt").value)]; // [degrees]
       for (const picture of [stage, symbols]) picture.turn(angles);
-    });
+    };
   become({});
   // Primitives alone recognize nothing; what moves there is where it was before the cell was shown again.
   hearNotebook(({ moved: { name, ...place } }) => {

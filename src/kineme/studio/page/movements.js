@@ -10,13 +10,10 @@ const MOST_VIA = 3;
 
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
 
-/** @typedef {ReturnType<typeof import("./snapshot.js").openSnapshot>} Snapshot */
-
 /**
  * Start and goal of a symbol where it was learned, moved to the middle of a box.
- * @param {Snapshot} backend
- * @param {string} name
- * @param {import("./stage.js").Box} box
+ * @param {OpenedSnapshot} backend
+ * @param {Box} box
  */
 export function placed({ runtime, generate }, name, box) {
   const { positions } = generate({ what: { symbol: name } });
@@ -30,8 +27,7 @@ export function placed({ runtime, generate }, name, box) {
 
 /**
  * A movement that can be changed.
- * @param {Snapshot} backend
- * @param {string} name
+ * @param {OpenedSnapshot} backend
  * @param {{symbol?: string, primitive?: Object}} what
  * @param {{start: number[], goal: number[]}} place
  */

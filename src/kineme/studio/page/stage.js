@@ -8,8 +8,6 @@ const RADIUS = 9; // of start and goal [CSS pixels]
 const EDGE = 1.5; // half of the line around a dot
 const FILLED = 0.8; // of the shorter side, by a typical movement
 
-/** @typedef {{center: number[], half: number}} Box a place in the middle, and how far is seen from there */
-
 /** A view as the snapshot has it, turned about what is up on the screen, then tilted. */
 class View extends Camera {
   /** @param {number[]} first rotation matrix, row by row: what is right, up and near on the screen */
@@ -37,7 +35,6 @@ export class Stage {
    * @param {HTMLCanvasElement} canvas
    * @param {number[]} first view, see `View`
    * @param {Box} box what is in view, in the unit of the movements
-   * @param {() => void} paint
    */
   constructor(canvas, first, box, paint) {
     this.box = box;
@@ -57,7 +54,7 @@ export class Stage {
     this.board.draw();
   }
 
-  /** @param {number[]} x @returns {number[]} Pixels. */
+  /** @returns Pixels. */
   project(x) {
     return this.camera.toScreen(x);
   }

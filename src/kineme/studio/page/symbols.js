@@ -30,7 +30,7 @@ export function createSymbols(symbols, view, choose) {
   startFinding(byId("find"), find, () => items.find(({ item }) => !item.hidden)?.button ?? null);
   find();
   return {
-    /** Mark the one of that name; none for null. @param {string|null} chosen */
+    /** Mark the one of that name; none for null. */
     select: (chosen) => {
       for (const { name, button } of items) button.setAttribute("aria-pressed", String(name === chosen));
     },

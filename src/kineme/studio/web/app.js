@@ -11,7 +11,7 @@ import { startSaving } from "./parts/saving.js";
 import { startShortcuts } from "./parts/shortcuts.js";
 import { say, tried } from "./parts/toasts.js";
 import { startViews } from "./parts/views.js";
-import { startRecordings } from "./recordings/view.js";
+import { Recordings } from "./recordings/view.js";
 import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";
@@ -19,7 +19,7 @@ const ANEW =
   "The studio was started anew, with another token. Open the address that it printed; " +
   "what you drew here stays until then.";
 
-/** The last part of a folder's path. @param {string} folder */
+/** The last part of a folder's path. */
 const lastPart = (folder) =>
   folder
     .replace(/[/\\]+$/, "")
@@ -34,17 +34,13 @@ onLibrary((contents) => {
   byId("library-mode").hidden = !contents.read_only;
   byId("undo").disabled = !contents.can_undo || contents.read_only;
   document.body.classList.toggle("read-only", contents.read_only);
-  fill(byId("names"), ...contents.symbols.map((/** @type {any} */ symbol) => make("option", { value: symbol.name })));
+  fill(byId("names"), ...contents.symbols.map((symbol) => make("option", { value: symbol.name })));
 });
 
-/** @param {boolean} here */
 function connected(here) {
   byId("status").dataset.state = here ? "here" : "away";
   byId("away-note").hidden = here;
-  if (!here)
-    get("/api/library").catch(
-      (/** @type {any} */ error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY),
-    );
+  if (!here) get("/api/library").catch((error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY));
 }
 
 const draw = startDraw((message) => live.send(message));
@@ -53,21 +49,21 @@ const live = new Live({
   answer: draw.answer,
   source: draw.source,
   error: (text) => draw.error(text) || say(text, { failed: true }),
-  changed: (version) => version !== library().version && tried(refresh),
+  changed: (version) => version !== library().version && tried(refresh()),
   here: () => {
     connected(true);
     draw.renewed();
-    tried(refresh);
+    tried(refresh());
   },
   away: () => {
     connected(false);
     draw.lost();
   },
 });
-tried(refresh); // without waiting for the websocket
+tried(refresh()); // without waiting for the websocket
 startLibrary();
 startMove();
-startRecordings();
+new Recordings();
 startRobot();
 startMirror();
 startShortcuts();

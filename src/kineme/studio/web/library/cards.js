@@ -7,7 +7,7 @@ import { thumbnail } from "../parts/thumbnails.js";
 /** @type {Set<string>} Ids of the symbols that are chosen to be merged. */
 export const chosen = new Set();
 
-/** @param {any} symbol @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
+/** @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 function card(symbol, page) {
   const box = make("input", {
     type: "checkbox",
@@ -32,17 +32,17 @@ function card(symbol, page) {
     },
     thumbnail(symbol.path),
     make("span", { class: "card-name", title: symbol.name }, ...breakable(symbol.name)),
-    make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
+    make("span", "soft small", counted(symbol.n_members, "movement")),
   );
-  return make("li", { class: "card" }, open, box);
+  return make("li", "card", open, box);
 }
 
 /** @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 export function showCards(page) {
   const { symbols } = library();
-  for (const id of chosen) if (!symbols.some((/** @type {any} */ symbol) => symbol.id === id)) chosen.delete(id);
+  for (const id of chosen) if (!symbols.some((symbol) => symbol.id === id)) chosen.delete(id);
   const shown = matching(byId("find-symbol"), symbols);
   byId("none-found").textContent =
     symbols.length && !shown.length ? "No symbol has these words in its name or description." : "";
-  keepingFocus(() => fill(byId("cards"), ...shown.map((/** @type {any} */ symbol) => card(symbol, page))));
+  keepingFocus(() => fill(byId("cards"), ...shown.map((symbol) => card(symbol, page))));
 }

@@ -6,7 +6,7 @@ import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 
-/** @param {any} entry A version. @param {number} seen */
+/** @param {any} entry A version. */
 async function again(entry, seen) {
   const text =
     `${entry.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, ` +
@@ -14,26 +14,24 @@ async function again(entry, seen) {
   if (await ask({ title: `Restore version ${entry.number}?`, text, yes: "Restore" })) await restore(entry.number, seen);
 }
 
-/** @param {any} entry */
 const of = ({ number }) => ({
   ...{ class: "button quiet", "data-key": `restore ${number}`, "aria-label": `Restore version ${number}` },
 });
 
-/** @param {any} entry @param {number} seen */
 const row = (entry, seen) =>
   make(
     "li",
     {},
-    make("span", { class: "numbers soft" }, `${entry.number}`),
-    make("span", { class: "said" }, entry.said),
-    make("time", { class: "soft small" }, String(entry.time).replace("T", " ").slice(0, 19)),
+    make("span", "numbers soft", `${entry.number}`),
+    make("span", "said", entry.said),
+    make("time", "soft small", String(entry.time).replace("T", " ").slice(0, 19)),
     entry.can_restore ? button("Restore", () => again(entry, seen), of(entry)) : null,
   );
 
 export async function showHistory() {
   if (!byId("history").open) return;
   const { version } = library();
-  const answer = await tried(() => get("/api/library/history"));
+  const answer = await tried(get("/api/library/history"));
   if (!answer || version !== library().version) return;
-  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((/** @type {any} */ entry) => row(entry, version))));
+  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((entry) => row(entry, version))));
 }

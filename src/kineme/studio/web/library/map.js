@@ -29,7 +29,7 @@ export class MovementMap {
 
   async load() {
     const { version } = library();
-    const answer = await tried(() => get("/api/library/map"));
+    const answer = await tried(get("/api/library/map"));
     if (!answer || version !== library().version) return;
     this.points = [...answer.points].sort((a, b) => a.x - b.x);
     this.at = -1;
@@ -38,10 +38,10 @@ export class MovementMap {
     this.board.draw();
   }
 
-  /** @returns {number[][]} Pixels of all points. */
+  /** @returns Pixels of all points. */
   pixels() {
     const { width, height } = this.board;
-    const range = (/** @type {"x"|"y"} */ axis) => [
+    const range = (axis) => [
       Math.min(...this.points.map((p) => p[axis])),
       Math.max(...this.points.map((p) => p[axis])),
     ];
@@ -66,7 +66,7 @@ export class MovementMap {
     this.names(pixels);
   }
 
-  /** As many names as fit; the one under the pointer in any case, and clearly. @param {number[][]} pixels */
+  /** As many names as fit; the one under the pointer in any case, and clearly. */
   names(pixels) {
     const { context } = this.board;
     const places = new Map();
@@ -89,7 +89,6 @@ export class MovementMap {
   }
 
   /**
-   * @param {string} id
    * @param {number[][]} members Their pixels.
    * @param {number[][]} taken From where to where, on which line, how far from it; this name is added.
    */
@@ -107,10 +106,10 @@ export class MovementMap {
   }
 
   /** Above, below or beside the dots of a name, where nothing else stands; null where there is no room. */
-  freePlace(/** @type {number[][]} */ members, /** @type {number} */ half, /** @type {number[][]} */ taken) {
+  freePlace(members, half, taken) {
     const { width, height } = this.board;
     const [across, along] = [members.map((pixel) => pixel[0]), members.map((pixel) => pixel[1])];
-    const middle = (/** @type {number[]} */ some) => some.reduce((sum, value) => sum + value, 0) / some.length;
+    const middle = (some) => some.reduce((sum, value) => sum + value, 0) / some.length;
     const x = Math.min(Math.max(middle(across), half), width - half);
     const places = [
       [x, Math.max(Math.min(...along) - 11, 14)],
@@ -125,7 +124,6 @@ export class MovementMap {
     return places.find(([at, line]) => at >= half && at <= width - half && free([at, line])) ?? null;
   }
 
-  /** @param {MouseEvent} event */
   point(event) {
     const box = this.board.canvas.getBoundingClientRect();
     const away = this.pixels().map(([x, y]) => Math.hypot(x - event.clientX + box.left, y - event.clientY + box.top));
@@ -133,7 +131,6 @@ export class MovementMap {
     this.show(away[nearest] < NEAR ? nearest : -1);
   }
 
-  /** @param {number} at */
   show(at) {
     if (at === this.at) return;
     this.at = at;
@@ -148,7 +145,6 @@ export class MovementMap {
     if (this.at >= 0) this.open(this.points[this.at].symbol ?? "");
   }
 
-  /** @param {KeyboardEvent} event */
   key(event) {
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (step && this.points.length) this.show((this.at + step + this.points.length) % this.points.length);

@@ -7,7 +7,6 @@ import { tried } from "../parts/toasts.js";
 
 const PAGE = 60;
 
-/** @param {any} movement @param {Set<number>} chosen @param {() => void} changed */
 export function memberButton(movement, chosen, changed) {
   const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
   if (library().read_only)
@@ -35,7 +34,7 @@ export class Members {
     const label = library().read_only ? "Movements" : "Movements; choose some";
     this.grid = make("div", { class: "members", role: "group", "aria-label": label });
     this.more = button("Show more", () => this.load(), { class: "button quiet", hidden: true });
-    this.element = make("div", { class: "members-part" }, this.grid, this.more);
+    this.element = make("div", "members-part", this.grid, this.more);
     this.shown = 0;
     this.loading = false;
     this.load();
@@ -46,7 +45,7 @@ export class Members {
     if (this.loading) return;
     this.loading = true;
     const part = `offset=${this.shown}&limit=${PAGE}&version=${library().version}`;
-    const answer = await tried(() => get(`/api/library/movements?${this.query}&${part}`));
+    const answer = await tried(get(`/api/library/movements?${this.query}&${part}`));
     this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);

@@ -20,7 +20,7 @@ async function unlabeled() {
   return all;
 }
 
-/** @param {any} proposal @param {Map<number, any>} movements */
+/** @param {Map<number, any>} movements */
 function card(proposal, movements) {
   const chosen = new Set();
   const field = make("input", {
@@ -39,7 +39,7 @@ function card(proposal, movements) {
     ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)),
   );
   const no = button("Not a symbol", () => reject(proposal.id), { class: "button quiet" });
-  const form = make("form", { class: "naming" }, field, yes, no);
+  const form = make("form", "naming", field, yes, no);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const name = field.value.trim();
@@ -48,14 +48,13 @@ function card(proposal, movements) {
   });
   return make(
     "li",
-    { class: "card proposal" },
-    make("p", { class: "soft small" }, counted(proposal.members.length, "alike movement")),
+    "card proposal",
+    make("p", "soft small", counted(proposal.members.length, "alike movement")),
     grid,
     library().read_only ? null : form,
   );
 }
 
-/** @param {number} count */
 function groups(count) {
   if (count > 1) return `${count} groups of them may be a symbol each.`;
   return count
@@ -67,12 +66,10 @@ export async function showProposals() {
   const { unlabeled: count, version } = library();
   byId("proposals").hidden = count === 0;
   if (!count) return;
-  const answer = await tried(() => get("/api/proposals"));
-  const movements = await tried(unlabeled);
+  const answer = await tried(get("/api/proposals"));
+  const movements = await tried(unlabeled());
   if (!answer || !movements || version !== library().version) return;
   const { proposals } = answer;
   byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${groups(proposals.length)}`;
-  keepingFocus(() =>
-    fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ proposal) => card(proposal, movements))),
-  );
+  keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((proposal) => card(proposal, movements))));
 }

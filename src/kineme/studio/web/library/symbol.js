@@ -13,29 +13,25 @@ import { Members } from "./members.js";
 
 const UNLABELED = "";
 
-/** @param {string} text @param {() => any} act @param {string} kind */
 const action = (text, act, kind = "") => button(text, act, { class: `button ${kind}`, "data-key": `symbol ${text}` });
 
-/** @param {any} symbol */
 async function rename(symbol) {
   const name = await ask({ title: `Rename ${symbol.name}`, yes: "Rename", name: symbol.name });
   if (name && name !== symbol.name) await changes.rename(symbol.id, name);
 }
 
-/** @param {any} symbol */
 async function forget(symbol) {
   const text = "Its movements stay in the library without a name. This can be undone.";
   if (await ask({ title: `Delete ${symbol.name}?`, text, yes: "Delete", danger: true }))
     await changes.forget(symbol.id, symbol.name);
 }
 
-/** @param {any} symbol */
 function description(symbol) {
   const placeholder = "What it means, for people and planners";
   const field = make("textarea", { rows: 2, maxlength: "2000", placeholder });
   field.value = symbol.description ?? "";
   field.addEventListener("change", () => changes.describe(symbol.id, field.value));
-  return make("label", { class: "field" }, make("span", {}, "Description"), field);
+  return make("label", "field", make("span", {}, "Description"), field);
 }
 
 /**
@@ -76,13 +72,12 @@ export class SymbolPanel {
   /** @param {(id: string) => void} closed */
   constructor(closed) {
     this.closed = closed;
-    byId("symbol").addEventListener("keydown", ({ key }) => key === "Escape" && this.close());
-    /** @type {string|null} Id; "" for the movements without a symbol. */
+    byId("symbol").onkeydown = ({ key }) => key === "Escape" && this.close();
+    /** Id; "" for the movements without a symbol. */
     this.opened = null;
     this.version = -1;
   }
 
-  /** @param {string|null} id @param {boolean} focus */
   open(id, focus = false) {
     this.opened = id;
     this.version = -1;
@@ -116,7 +111,7 @@ export class SymbolPanel {
       count.textContent = ids.length ? `${counted(ids.length, "movement")} chosen` : hint;
       compared.hidden = true;
       if (ids.length !== 2) return;
-      const both = await tried(() => get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
+      const both = await tried(get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
       if (!both || String(members.ids()) !== String(ids)) return; // others are chosen by now
       words.textContent = `${both.in_words}.`;
       compared.hidden = false;
@@ -137,7 +132,6 @@ export class SymbolPanel {
     );
   }
 
-  /** @param {any} symbol */
   head(symbol) {
     const moveIt = () => {
       chooseToMove(symbol.id);
@@ -145,20 +139,19 @@ export class SymbolPanel {
     };
     const { read_only: readOnly } = library();
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
-    const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts));
+    const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", "soft", facts));
     const acts = [
       action("Move it", moveIt, "main"),
       action("Rename", () => rename(symbol)),
       action("Delete symbol", () => forget(symbol), "danger"),
     ];
     return [
-      make("div", { class: "symbol-head" }, thumbnail(symbol.path), words),
-      make("div", { class: "row" }, ...acts.slice(0, readOnly ? 1 : 3)),
+      make("div", "symbol-head", thumbnail(symbol.path), words),
+      make("div", "row", ...acts.slice(0, readOnly ? 1 : 3)),
       readOnly ? symbol.description && make("p", {}, symbol.description) : description(symbol),
     ];
   }
 
-  /** @param {Element} panel */
   hint(panel) {
     this.opened = null;
     panel.classList.remove("opened");
@@ -166,6 +159,6 @@ export class SymbolPanel {
       ? "Here its movements are shown."
       : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. " +
         "Everything can be undone.";
-    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, text)));
+    fill(panel, make("div", "empty", make("h3", {}, "Choose a symbol"), make("p", {}, text)));
   }
 }

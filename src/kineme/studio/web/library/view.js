@@ -31,7 +31,7 @@ async function mergeChosen() {
 export function startLibrary() {
   const panel = new SymbolPanel((id) => {
     marked(null);
-    /** @type {HTMLElement} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus();
+    document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`)?.focus();
   });
   const map = new MovementMap((id) => open(id));
   const chose = () => {
@@ -44,9 +44,9 @@ export function startLibrary() {
   /** @param {string|null} id The one that is open. */
   function marked(id) {
     for (const card of document.querySelectorAll(".card-open"))
-      card.setAttribute("aria-current", String(/** @type {any} */ (card).dataset.key === `open ${id}`));
+      card.setAttribute("aria-current", String(card.dataset.key === `open ${id}`));
   }
-  function open(/** @type {string} */ id) {
+  function open(id) {
     panel.open(id, true);
     marked(id);
   }
@@ -70,10 +70,10 @@ export function startLibrary() {
     showHistory();
   };
   startFinding(byId("find-symbol"), cards, () => document.querySelector(".card-open"));
-  byId("merge").addEventListener("click", mergeChosen);
-  byId("show-unlabeled").addEventListener("click", () => open(""));
-  byId("history").addEventListener("toggle", showHistory);
-  byId("confusion").addEventListener("toggle", showConfusion);
+  byId("merge").onclick = mergeChosen;
+  byId("show-unlabeled").onclick = () => open("");
+  byId("history").ontoggle = showHistory;
+  byId("confusion").ontoggle = showConfusion;
   onShow("library", all);
   onLibrary(all);
 }

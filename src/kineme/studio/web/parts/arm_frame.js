@@ -2,9 +2,7 @@
 import { fill, make } from "./elements.js";
 
 /**
- * @param {HTMLElement} host
- * @param {string} address
- * @param {(message: any) => void} hear Where the start or the goal was dragged to.
+ * Open the frame; `hear` is told where the start or the goal was dragged to.
  * @returns {Promise<(message: Object) => void>} Tells the frame what to show, once it listens.
  */
 export const openArm = (host, address, hear) =>

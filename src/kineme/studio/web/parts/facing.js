@@ -14,11 +14,7 @@ export function axesOf({ around, above }) {
   return { right: [c, s, 0], up: [-s * Math.sin(above), c * Math.sin(above), Math.cos(above)] };
 }
 
-/**
- * How coordinates of paths vary together, each path about its middle.
- * @param {number[][][]} paths
- * @returns {number[][]}
- */
+/** How coordinates of paths vary together, each path about its middle. */
 function variances(paths) {
   const sums = [0, 1, 2].map(() => [0, 0, 0]);
   for (const path of paths) {
@@ -33,9 +29,9 @@ function variances(paths) {
 /** @param {number[][][]} paths In space. @returns {{around: number, above: number}} */
 export function facing(paths) {
   const varied = variances(paths);
-  const along = (/** @type {number[]} */ a, /** @type {number[]} */ b) =>
+  const along = (a, b) =>
     a.reduce((sum, value, j) => sum + value * b.reduce((more, other, k) => more + varied[j][k] * other, 0), 0);
-  const area = (/** @type {{around: number, above: number}} */ view) => {
+  const area = (view) => {
     const { right, up } = axesOf(view);
     const askew = Math.sin(view.above) * Math.abs(Math.sin(view.around));
     return (1 - ASKEW * askew) * (along(right, right) * along(up, up) - along(right, up) ** 2);

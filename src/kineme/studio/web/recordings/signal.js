@@ -16,7 +16,6 @@ export function signal(context, x, values, [top, bottom], look) {
     if (value > high) high = value;
   }
   const scale = (bottom - top) / (high - low || 1);
-  /** @type {number[][]} */
   let points = [];
   for (const [k, value] of values.entries()) {
     if (value !== null) points.push([x[k], bottom - scale * (value - low)]);
