@@ -5,11 +5,7 @@ const FORMAT = "kineme-snapshot";
 const VERSION = 6;
 const SMALLEST = 2.2250738585072014e-308; // number whose logarithm is taken
 
-/**
- * The arrays of a snapshot; they share one block of memory.
- * @param {string|Object} text a JSON document, or what was parsed of it
- * @returns {Snapshot}
- */
+/** The arrays of a snapshot, in JSON or parsed; they share one block of memory. @returns {Snapshot} */
 export function unpack(text) {
   const given = typeof text === "string" ? JSON.parse(text) : text;
   if (given.format !== FORMAT || given.version !== VERSION) {
@@ -34,8 +30,8 @@ export function product(a, i, b, j, n) {
 }
 
 /**
- * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before; written
- * from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait for each
+ * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before, are
+ * written from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait for each
  * other, so that this takes a third of the time of `product`.
  */
 export function ninefold(a, i, b, j, step, n, into, at, N) {

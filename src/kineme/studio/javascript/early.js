@@ -13,13 +13,8 @@ const WHOLE = [1];
 
 /** Progress and time left on average over a class's hypotheses, the remaining path from its best one. */
 function forecast(stored, evidence, label, begun, duration) {
-  const {
-    early,
-    first,
-    n_movements: m,
-    comparison: { n_dims: d },
-  } = stored.recognizer.header;
-  const [G, { paths, prefixes, S }] = [early.n_progress, stored];
+  const { early, first, n_movements: m, comparison } = stored.recognizer.header;
+  const [G, d, { paths, prefixes, S }] = [early.n_progress, comparison.n_dims, stored];
   const from = first[label] * G;
   const own = evidence.subarray(from, (first[label + 1] ?? m) * G);
   const weights = softmax(own);

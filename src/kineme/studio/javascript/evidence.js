@@ -10,20 +10,15 @@ import { align, rotates } from "./rotation.js";
 /** Logarithms of the densities of size, duration, timing, speed at the end, and progress, for each hypothesis. */
 function logPriors(stored, begun, duration) {
   const { prefixes, progress, S, logLengths, logDurations, timingSquares } = stored;
-  const {
-    size_spread: sizeSpread,
-    duration_spread: durationSpread,
-    timing_spread: timingSpread,
-    numbers,
-  } = stored.recognizer.header.early;
+  const { size_spread, duration_spread, timing_spread, numbers } = stored.recognizer.header.early;
   const [length, longer] = [begun.lengths[0], duration].map(finiteLog);
   const square = product(begun.timing, 0, begun.timing, 0, S);
   const over = (value, spread) => (spread === null ? 0 : 0.5 * (value / spread) ** 2);
   return logLengths.map((_, h) => {
     const late = Math.max(square + timingSquares[h] - 2 * product(begun.timing, 0, prefixes.timing, h * S, S), 0);
-    const normal = over(length - logLengths[h], sizeSpread) + over(longer - logDurations[h], durationSpread);
+    const normal = over(length - logLengths[h], size_spread) + over(longer - logDurations[h], duration_spread);
     const faster = (begun.endSpeeds[0] - prefixes.endSpeeds[h]) / numbers.speed_spread;
-    const cauchy = (1 + over(Math.sqrt(late), timingSpread)) * (1 + 0.5 * faster * faster);
+    const cauchy = (1 + over(Math.sqrt(late), timing_spread)) * (1 + 0.5 * faster * faster);
     return numbers.progress * Math.log(progress[h % progress.length]) - normal - Math.log(cauchy);
   });
 }

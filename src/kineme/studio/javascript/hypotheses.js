@@ -63,7 +63,7 @@ function describeBeginning(prefixes, at, own, times, d, S, rule, signals) {
   fillShapes(sized, rule, prefixes.shapes, at, signals);
 }
 
-/** Every stored movement at every progress; made once. @param {Recognizer} recognizer */
+/** Every stored movement at every progress; made once. */
 export function hypotheses(recognizer) {
   const { header, arrays } = recognizer;
   const { early, comparison, n_movements: m } = header;

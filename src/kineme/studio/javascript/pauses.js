@@ -1,12 +1,7 @@
 // Pauses within a movement, cut short: stamps far apart, and rests. The same as kineme.movements.preparation.pauses,
 // whose numbers come with the snapshot.
 
-/**
- * The movement without its pauses; the same object if it has none.
- * @param {TimedPositions} movement
- * @param {PauseRule} rule
- * @returns {TimedPositions}
- */
+/** The movement without its pauses; the same object if it has none. @param {PauseRule} rule */
 export function withoutPauses(movement, rule) {
   let cut = movement;
   for (let round = 0; round < rule.rounds; round++) {

@@ -7,16 +7,9 @@ const TIME_SHARE = 1e-3; // of the arc-length phase, which keeps it rising throu
 const MIN_SAMPLES = 4;
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
-/**
- * A movement, checked.
- * @param {ArrayLike<ArrayLike<number>>|ArrayLike<number>} positions T samples of d numbers
- * @returns {TimedPositions}
- */
+/** A movement, checked: positions are T samples of d numbers, or all of these in a row. @returns {TimedPositions} */
 export function movement(times, positions, d) {
-  /** @type {(number|number[])[]} */
-  const rows = Array.from(/** @type {ArrayLike<number|ArrayLike<number>>} */ (positions), (row) =>
-    typeof row === "number" ? row : Array.from(row),
-  );
+  const rows = Array.from(positions, (row) => (typeof row === "number" ? row : [...row]));
   const flat = Float64Array.from(rows.flat());
   const t = Float64Array.from(times);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
@@ -32,7 +25,7 @@ export function movement(times, positions, d) {
   return { times: t, positions: flat, d };
 }
 
-/** One dimension minus its first number. @param {TimedPositions} movement */
+/** One dimension minus its first number. */
 function column(movement, k) {
   const { positions, d } = movement;
   return Float64Array.from(movement.times, (_, j) => positions[j * d + k] - positions[k]);
@@ -53,8 +46,7 @@ function spread(times) {
 /**
  * The smoothing spline at n even times, minus the first recorded position: d rows of n numbers.
  * It minimizes `sum_j (x_j - g(u_j))^2 + lam * integral g''(u)^2 du` (Reinsch 1967), with the lam of `cutoff` cycles.
- * @param {TimedPositions} movement
- * @param {number|null} cutoff none: an interpolating spline
+ * Without a cutoff it is an interpolating spline.
  */
 export function evenPath(movement, cutoff, n) {
   if (cutoff === null) return splinePath(movement, n);
@@ -117,10 +109,7 @@ function evaluate(v, x, m, n) {
   return samples;
 }
 
-/**
- * The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers.
- * @param {TimedPositions} movement
- */
+/** The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers. */
 export function splinePath(movement, n) {
   const apart = separated(movement);
   const v = apart.times.map((t) => t - apart.times[0]);
@@ -156,10 +145,7 @@ function bends(v, x) {
   return m;
 }
 
-/**
- * The movement with each group of close samples replaced by its mean; usually there is none.
- * @param {TimedPositions} movement
- */
+/** The movement with each group of close samples replaced by its mean; usually there is none. */
 function separated(movement) {
   const { times, positions, d } = movement;
   const T = times.length;
@@ -204,11 +190,7 @@ function joined(times, gaps, step) {
   return merged;
 }
 
-/**
- * Arc-length phase of an even path, from 0 to 1, blended with time.
- * @param {ArrayLike<number>} path d rows of n numbers
- * @param {number} [share] of the arc length
- */
+/** A phase of an even path, d rows of numbers, from 0 to 1: a share of it is that of arc length, the rest time. */
 export function arcLengthPhase(path, d, share = 1) {
   const n = path.length / d;
   const phase = new Float64Array(n);

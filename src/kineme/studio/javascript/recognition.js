@@ -26,7 +26,7 @@ const SHARES = {
   min: (logs) => logs.map((log) => (log === Math.min(...logs) ? 1 : 0)),
 };
 
-/** The stored movements, described by their smooth paths. @param {Snapshot} snapshot @returns {Recognizer} */
+/** The stored movements, described by their smooth paths. @returns {Recognizer} */
 export function knownClasses({ header, arrays }) {
   const how = header.comparison;
   const [d, m] = [how.n_dims, header.n_movements];
@@ -74,7 +74,7 @@ function largest(values, first) {
   });
 }
 
-/** How a movement compares with every class. @param {Recognizer} recognizer */
+/** How a movement compares with every class. */
 export function compare(recognizer, described) {
   const { comparison: how, first, classifier, medoids } = recognizer.header;
   const logs = kernelLogs(how, squaredDistances(how, described, recognizer.stored));
@@ -141,9 +141,8 @@ function byStrangers(recognizer, away) {
 }
 
 /**
- * P-values of each class and of all together, see kineme.recognition.conformal.
- * @param {Recognizer} recognizer
- * @param {Float64Array} nearest log similarity to the nearest movement of each class
+ * P-values of each class and of all together, see kineme.recognition.conformal, by the log similarity to the nearest
+ * movement of each class.
  */
 function pValues(recognizer, nearest, errorRate) {
   const { calibration } = recognizer.header;
@@ -175,11 +174,8 @@ function probabilities(recognizer, similar) {
 }
 
 /**
- * The answer to a movement.
- * @param {Recognizer} recognizer
- * @param {TimedPositions} movement
- * @param {number} [errorRate] share of known movements that may be called unknown
- * @returns {Answer}
+ * The answer to a movement; the error rate is the share of known movements that may be called unknown.
+ * @param {Recognizer} recognizer @param {TimedPositions} movement @returns {Answer}
  */
 export function recognize(recognizer, movement, errorRate = 0.05) {
   const { calibration, comparison: how, classes, first } = recognizer.header;

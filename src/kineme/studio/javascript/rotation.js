@@ -15,12 +15,10 @@ const LEAST_TIE = 1e-9;
 export const rotates = ({ n_dims: d, max_angle }) => max_angle > 0 && (d === 2 || d === 3);
 
 /**
- * The largest inner product of row a with the rotated row b, less what the rotation costs, and that rotation.
+ * The largest inner product of row a with the rotated row b, less what the rotation costs, and that rotation R (d, d),
+ * which is written if given. The rows, see `setRow`, have n numbers for each dimension, from i and j on;
+ * norms are |a| |b|.
  * @param {RotationRule} rule
- * @param {Float32Array} a of n numbers for each dimension, from i on; see `setRow`
- * @param {Float32Array} b from j on
- * @param {number} norms |a| |b|
- * @param {Float64Array|null} R (d, d), written if given
  */
 export function align(rule, a, i, b, j, n, norms, R) {
   const d = rule.n_dims;
@@ -66,10 +64,7 @@ function inSpace(rule, a, i, b, j, n, norms, R) {
 const M = new Float64Array(9);
 const A = new Float64Array(9);
 
-/**
- * Largest tr(R' G) over rotations R, and that rotation: the largest root of a quartic (Theobald 2005, Markley 1993).
- * @param {Float64Array} G (3, 3)
- */
+/** Largest tr(R' G) over rotations R, and that rotation: the largest root of a quartic (Theobald 2005). */
 function largestTrace(G, R) {
   let size = 0;
   for (let k = 0; k < 9; k++) size += G[k] * G[k];
@@ -127,12 +122,7 @@ function rotate(R, top, square, determinant) {
   }
 }
 
-/**
- * The rotation that brings b closest to a, whatever it costs; of several equally good ones the smallest.
- * @param {RotationRule} rule
- * @param {Float32Array} a d rows of n numbers
- * @returns (d, d)
- */
+/** The rotation (d, d) that brings b closest to a, whatever it costs; of several equally good ones the smallest. */
 export function bestRotation(rule, a, b) {
   const d = rule.n_dims;
   const R = new Float64Array(d * d);

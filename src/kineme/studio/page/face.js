@@ -1,8 +1,8 @@
 // The page: draw, see live what it is, drag start and goal.
 
 import { AnswerPanel } from "../web/parts/answer_panel.js";
-import { drag } from "../web/parts/dragging.js";
-import { byId, make, write } from "../web/parts/elements.js";
+import { ARROWS, drag } from "../web/parts/dragging.js";
+import { byId, fill, handOver, make, write } from "../web/parts/elements.js";
 import { followPointer } from "../web/parts/stroke.js";
 import { createMoving, placed } from "./movements.js";
 import { openSnapshot } from "./snapshot.js";
@@ -109,10 +109,8 @@ function tellMoved() {
 function movable(name, what, place) {
   try {
     const moving = createMoving(backend, name, what, place);
-    return {
-      moving,
-      note: moving.update({ formulation: byId("formulation").value || header.movements.formulation }) ?? "",
-    };
+    const formulation = byId("formulation").value || header.movements.formulation;
+    return { moving, note: moving.update({ formulation }) ?? "" };
   } catch (error) {
     return { moving: null, note: error.message };
   }
@@ -201,8 +199,6 @@ const hearer = {
   ends: () => state.stroke && finish(),
 };
 
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-
 function key(event) {
   if (event.key === "Escape") become({});
   else if (event.key === " ") play();
@@ -222,34 +218,29 @@ function play() {
   const { moving } = state;
   if (!moving) return;
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const began = performance.now();
   const duration = moving.times.at(-1);
-  const step = (now) => {
-    if (state.moving !== moving || state.held || state.stroke) return;
-    // A frame may be older than its wish.
-    const share = still ? 1 : Math.min(Math.max(now - began, 0) / 1000 / duration, 1);
+  stage.board.run((time) => {
+    if (state.moving !== moving || state.held || state.stroke) return false;
+    const share = still ? 1 : Math.min(time / duration, 1);
     state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
     stage.board.draw();
-    if (share < 1) requestAnimationFrame(step);
-  };
-  requestAnimationFrame(step);
+    return share < 1;
+  });
 }
 
 function save() {
   const { moving } = state;
   const head = ["t [s]", ..."xyz".slice(0, d)].join(",");
   const rows = moving.positions.map((x, i) => [moving.times[i], ...x].map((value) => value.toPrecision(9)).join(","));
-  const url = URL.createObjectURL(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }));
-  make("a", { href: url, download: "movement.csv" }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
+  handOver(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }), "movement.csv");
 }
 
 function start() {
-  for (const name of runtime.formulations) byId("formulation").append(make("option", { value: name }, name));
+  const options = runtime.formulations.map((value) => make("option", { value }, value));
+  fill(byId("formulation"), ...options);
   byId("formulation").value = header.movements.formulation;
   byId("how").hidden = runtime.formulations.length < 2;
-  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".turn")))
-    label.hidden = d === 2;
+  for (const label of document.querySelectorAll(".turn")) label.hidden = d === 2;
   canvas.addEventListener("pointerdown", hold);
   followPointer(canvas, hearer);
   canvas.addEventListener("pointermove", (event) => {
@@ -264,7 +255,7 @@ function start() {
   byId("formulation").onchange = () => update({ formulation: byId("formulation").value });
   for (const id of ["turn", "tilt"])
     byId(id).oninput = () => {
-      const angles = [Number(byId("turn").value), Number(byId("tilt").value)]; // [degrees]
+      const angles = [byId("turn").valueAsNumber, byId("tilt").valueAsNumber]; // [degrees]
       for (const picture of [stage, symbols]) picture.turn(angles);
     };
   become({});

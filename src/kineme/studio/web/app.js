@@ -19,22 +19,14 @@ const ANEW =
   "The studio was started anew, with another token. Open the address that it printed; " +
   "what you drew here stays until then.";
 
-/** The last part of a folder's path. */
-const lastPart = (folder) =>
-  folder
-    .replace(/[/\\]+$/, "")
-    .split(/[/\\]/)
-    .pop() || folder;
-
-onLibrary((contents) => {
-  byId("library-name").textContent = lastPart(contents.folder);
-  byId("library-name").title = contents.folder;
-  byId("library-count").textContent =
-    `${counted(contents.symbols.length, "symbol")}, ${counted(contents.n_movements, "movement")}`;
-  byId("library-mode").hidden = !contents.read_only;
-  byId("undo").disabled = !contents.can_undo || contents.read_only;
-  document.body.classList.toggle("read-only", contents.read_only);
-  fill(byId("names"), ...contents.symbols.map((symbol) => make("option", { value: symbol.name })));
+onLibrary(({ folder, symbols, n_movements: n, read_only: isReadOnly, can_undo: canUndo }) => {
+  byId("library-name").textContent = folder.split(/[/\\]/).findLast(Boolean) ?? folder;
+  byId("library-name").title = folder;
+  byId("library-count").textContent = `${counted(symbols.length, "symbol")}, ${counted(n, "movement")}`;
+  byId("library-mode").hidden = !isReadOnly;
+  byId("undo").disabled = !canUndo || isReadOnly;
+  document.body.classList.toggle("read-only", isReadOnly);
+  fill(byId("names"), ...symbols.map(({ name: value }) => make("option", { value })));
 });
 
 function connected(here) {

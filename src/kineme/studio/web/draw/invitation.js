@@ -14,7 +14,7 @@ export function takesDrawings() {
   return dims === 3 && symbols.every((symbol) => !symbol.path || isPlane(symbol.path));
 }
 
-/** @param {boolean} filled Whether there is a movement on the canvas. */
+/** Show it, or the canvas that is filled by a movement. */
 export function showInvitation(filled) {
   const [{ symbols }, takes] = [library(), takesDrawings()];
   showLegend(filled);
@@ -30,7 +30,7 @@ export function showInvitation(filled) {
 
 const picture = ({ name, path }) => make("li", {}, thumbnail(path), make("span", { title: name }, ...breakable(name)));
 
-/** @param {boolean} filled Whether there is a movement: the invitation goes, and what its colors mean is said. */
+/** Where a movement has filled the canvas the invitation goes, and what its colors mean is said. */
 export function showLegend(filled) {
   const { symbols } = library();
   byId("draw-empty").hidden = filled;

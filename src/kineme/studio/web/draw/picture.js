@@ -7,7 +7,6 @@ const FINGER = 10; // radius of the replayed point [px]
 const HAND = [[5, 9, 13, 17], ...[1, 5, 9, 13, 17].map((k) => [0, k, k + 1, k + 2, k + 3])];
 
 export class Picture {
-  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.ink = [];
     this.rest = [];
@@ -41,7 +40,7 @@ export class Picture {
     const { context } = this.board;
     const ink = this.ink.map((sample) => this.pixel(sample.slice(1)));
     const rest = this.rest.map((point) => this.pixel(point));
-    if (this.turns) ground(context, this.frame.camera, [this.frame.low, this.frame.high], color("--line"));
+    if (this.turns) ground(context, this.frame.camera, [this.frame.low, this.frame.high]);
     if (rest.length && ink.length)
       line(context, [ink.at(-1), ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
     line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });

@@ -8,21 +8,16 @@ import { Picture } from "./picture.js";
 
 export const FEWEST_SAMPLES = 4; // that make a movement
 
-/** @param {(message: Object) => boolean} send @returns {DrawSession} */
+const NOTHING = { source: null, movement: null, learned: null, label: null, pending: false, drawing: false };
+
+/** @returns {DrawSession} */
 export const createSession = (send) => ({
   picture: new Picture(byId("draw-canvas")),
   panel: new AnswerPanel({ picture: (name) => symbolNamed(name)?.path ?? null }),
   sending: server.follow(send),
   naming: null,
-  drawing: false,
-  pending: false,
-  movement: null,
-  learned: null,
-  pointer: "",
-  height: 1,
-  label: null,
-  source: null,
-  dismissed: "",
+  ...{ pointer: "", height: 1, dismissed: "" },
+  ...NOTHING,
 });
 
 /** A key of the movement that a program sends. */
@@ -41,8 +36,7 @@ export function clear(session) {
   byId("sources").classList.remove("waits");
   Object.assign(picture, { ink: [], rest: [], height: null, replayed: null, frame: null });
   picture.board.draw();
-  const nothing = { source: null, movement: null, learned: null, label: null };
-  Object.assign(session, nothing, { pending: false, drawing: false });
+  Object.assign(session, NOTHING);
   session.panel.idle();
   session.naming.allow(false);
   session.naming.empty();

@@ -4,7 +4,7 @@ import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 const MOST = 10000; // samples that are held of a movement, the last ones
 
 export class Sources {
-  /** @param {(source: Source) => void} changed @param {() => void} fewer A program is gone or ignored. */
+  /** Fewer there are where a program is gone or ignored. */
   constructor(changed, fewer) {
     this.changed = changed;
     this.fewer = fewer;

@@ -8,25 +8,24 @@ import { tried } from "../parts/toasts.js";
 const PAGE = 60;
 
 export function memberButton(movement, chosen, changed) {
-  const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
-  if (library().read_only)
-    return make("div", { class: "member", role: "img", "aria-label": about, title: about }, thumbnail(movement.path));
+  const { id, name, path, duration } = movement;
+  const title = `${name ?? `Movement ${id}`}, ${(duration ?? 0).toFixed(1)} s`;
+  const look = { class: "member", "aria-label": title, title };
+  if (library().read_only) return make("div", { ...look, role: "img" }, thumbnail(path));
   const choose = () => {
-    chosen.has(movement.id) ? chosen.delete(movement.id) : chosen.add(movement.id);
-    member.setAttribute("aria-pressed", String(chosen.has(movement.id)));
+    chosen.delete(id) || chosen.add(id);
+    member.ariaPressed = String(chosen.has(id));
     changed();
   };
-  const member = button("", choose, {
-    ...{ class: "member", "aria-label": about, title: about, "data-key": `movement ${movement.id}` },
-    "aria-pressed": String(chosen.has(movement.id)),
-  });
-  member.append(thumbnail(movement.path));
+  const member = button("", choose, { ...look, "data-key": `movement ${id}` });
+  member.ariaPressed = String(chosen.has(id));
+  member.append(thumbnail(path));
   return member;
 }
 
 /** The members of a symbol, or the movements without one, with a button for more. */
 export class Members {
-  /** @param {string} query As `symbol=ID` or `unlabeled=1`. @param {() => void} changed When others are chosen. */
+  /** The query is `symbol=ID` or `unlabeled=1`. */
   constructor(query, changed) {
     this.query = query;
     this.changed = changed;

@@ -1,5 +1,5 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
-import { get } from "../parts/api.js";
+import { get, path } from "../parts/api.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { breakable, button, byId, counted, fill, make } from "../parts/elements.js";
@@ -28,21 +28,15 @@ async function forget(symbol) {
 
 function description(symbol) {
   const placeholder = "What it means, for people and planners";
-  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder });
-  field.value = symbol.description ?? "";
-  field.addEventListener("change", () => changes.describe(symbol.id, field.value));
+  const onchange = ({ target }) => changes.describe(symbol.id, target.value);
+  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder, onchange }, symbol.description);
   return make("label", "field", make("span", {}, "Description"), field);
 }
 
-/**
- * What can be done with chosen movements.
- * @param {any} symbol Or null of those without one.
- * @param {Members} members
- */
+/** What can be done with chosen movements of a symbol, or of none. @param {Members} members */
 function actions(symbol, members) {
   const ids = () => members.ids();
   const some = () => counted(ids().length, "movement");
-  /** @type {(title: string, text: string, yes: string) => Promise<string|null>} */
   const named = (title, text, yes) => ask({ title, text: `${some()} ${text}`, yes, name: "" });
   const give = async () => {
     const text = "chosen. A name that exists is that symbol, another one is a new symbol.";
@@ -69,12 +63,11 @@ function actions(symbol, members) {
  * closes.
  */
 export class SymbolPanel {
-  /** @param {(id: string) => void} closed */
   constructor(closed) {
     this.closed = closed;
-    byId("symbol").onkeydown = ({ key }) => key === "Escape" && this.close();
-    /** Id; "" for the movements without a symbol. */
-    this.opened = null;
+    this.hint = byId("symbol").firstElementChild;
+    byId("symbol").addEventListener("keydown", ({ key }) => key === "Escape" && this.close());
+    this.opened = null; // id; "" for the movements without a symbol
     this.version = -1;
   }
 
@@ -88,14 +81,14 @@ export class SymbolPanel {
 
   close() {
     const id = this.opened ?? "";
-    this.hint(byId("symbol"));
+    this.clear();
     this.closed(id);
   }
 
   show() {
     const panel = byId("symbol");
     const symbol = this.opened ? symbolOf(this.opened) : null;
-    if (!symbol && (this.opened !== UNLABELED || !library().unlabeled)) return this.hint(panel);
+    if (!symbol && (this.opened !== UNLABELED || !library().unlabeled)) return this.clear();
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
@@ -105,7 +98,7 @@ export class SymbolPanel {
     const words = make("figcaption", { class: "small", role: "status" });
     const compared = make("figure", { class: "compared", hidden: true }, canvas, words);
     const overlay = new Overlay(canvas);
-    const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", async () => {
+    const members = new Members(symbol ? path`symbol=${symbol.id}` : "unlabeled=1", async () => {
       const ids = members.ids();
       for (const act of acts) act.disabled = !ids.length;
       count.textContent = ids.length ? `${counted(ids.length, "movement")} chosen` : hint;
@@ -138,7 +131,7 @@ export class SymbolPanel {
       show("move", true);
     };
     const { read_only: readOnly } = library();
-    const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
+    const facts = symbol.duration ? `${symbol.duration.toFixed(1)} s` : "";
     const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", "soft", facts));
     const acts = [
       action("Move it", moveIt, "main"),
@@ -152,13 +145,10 @@ export class SymbolPanel {
     ];
   }
 
-  hint(panel) {
+  /** Say what can be done here. */
+  clear() {
     this.opened = null;
-    panel.classList.remove("opened");
-    const text = library().read_only
-      ? "Here its movements are shown."
-      : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. " +
-        "Everything can be undone.";
-    fill(panel, make("div", "empty", make("h3", {}, "Choose a symbol"), make("p", {}, text)));
+    byId("symbol").classList.remove("opened");
+    fill(byId("symbol"), this.hint);
   }
 }

@@ -12,7 +12,6 @@ export function handlesOf(plan, camera, page) {
   const smallest = SMALLEST * extent(plan.path);
   return pointsOf(plan).flatMap(({ key, kind, name, owner, field, list }) => {
     const remove = list && (() => page.removed(list, owner));
-    /** @type {Handle} */
     const point = {
       ...{ key, kind, name, remove },
       at: () => owner[field],
@@ -22,7 +21,6 @@ export function handlesOf(plan, camera, page) {
       },
     };
     if (kind !== "obstacle") return [point];
-    /** @type {Handle} */
     const rim = {
       ...{ key: `${key} rim`, kind: "rim", name: `Rim of ${name.toLowerCase()}`, remove },
       at: () => camera.moved(owner.center, owner.radius * camera.scale, 0),
@@ -36,7 +34,6 @@ export function handlesOf(plan, camera, page) {
 }
 
 export class Handles {
-  /** @param {Camera} camera */
   constructor(camera, page) {
     this.camera = camera;
     this.page = page;

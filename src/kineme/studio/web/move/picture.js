@@ -11,7 +11,6 @@ const NEAR = { mouse: 12, pen: 16, touch: 24 }; // from the path, where it can b
 const ENDS = 0.03; // of the duration: nearer to start and goal the path is theirs
 
 export class MovePicture {
-  /** @param {Camera} camera */
   constructor(camera, turned, grabbed) {
     this.camera = camera;
     this.paths = [];
@@ -93,7 +92,7 @@ export class MovePicture {
     const { context } = this.board;
     if (!this.plan) return;
     const pixels = (rows) => rows.map((row) => this.camera.toScreen(row));
-    if (!this.camera.flat) ground(context, this.camera, bounds(this.plan.path), color("--line"));
+    if (!this.camera.flat) ground(context, this.camera, bounds(this.plan.path));
     for (const obstacle of this.plan.obstacles) this.paintObstacle(obstacle);
     line(context, pixels(this.plan.path), { color: color("--gray"), width: 7, alpha: 0.28 });
     for (const { path, look } of this.paths)

@@ -46,7 +46,7 @@ export const rounded = (value, size) => String(Number(value.toFixed(clamp(Math.c
 export const what = (plan) =>
   plan.style ? { style: { symbol: plan.symbol, values: plan.style } } : { symbol: plan.symbol };
 
-/** @param {Plan} plan @returns A question to the server. */
+/** A question to the server. @param {Plan} plan */
 export function question(plan, formulation) {
   const { start, goal, usual, share, obstacles } = plan;
   const via = plan.via.toSorted((a, b) => a.at - b.at).map(({ at, point }) => [at, point]);

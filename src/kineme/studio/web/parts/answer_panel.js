@@ -25,9 +25,9 @@ function differs({ largest_difference: most, from, to }) {
 }
 
 export class AnswerPanel {
-  /** @param {{picture?: (name: string) => number[][]|null, advice?: () => string}} page */
-  constructor({ picture = () => null, advice = () => "" } = {}) {
-    this.page = { picture, advice };
+  /** The page has pictures of names, and may give advice. @param {any} page */
+  constructor(page = {}) {
+    this.page = page;
     this.rows = Array.from({ length: ROWS }, row);
     fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.nearest = new Overlay(byId("nearest"));
@@ -56,7 +56,7 @@ export class AnswerPanel {
     byId("verdict").parentElement.dataset.state = state;
     if (like === this.like) return;
     this.like = like;
-    this.show(like && this.page.picture(like));
+    this.show(like && this.page.picture?.(like));
   }
 
   /** Beside the words: an example. */
@@ -121,14 +121,14 @@ export class AnswerPanel {
     if (label !== null && certainty) this.speak(`Looks like ${name}, so far.`);
   }
 
-  /** Of the whole movement. @param {() => any} explain Its explanation, or a promise of it. */
+  /** Of the whole movement. Explain gives its explanation, or a promise of it. */
   final(answer, explain) {
     const { label, certainty, ranked, rule, p_known: known, promise } = answer;
     const [name, word] = [label ?? ranked[0].label, capital(certainty)];
     const note = [
       label === null ? `Most like ${name}.` : "",
       rule === "guess" ? "More drawings of each would say how sure." : "",
-      label === null ? "" : this.page.advice(),
+      label === null ? "" : this.page.advice?.(),
     ].join(" ");
     const state = { new: "unknown", "looks like": "open" }[certainty] ?? "known";
     this.words(word, label ?? "Unknown", note.trim(), state, name);

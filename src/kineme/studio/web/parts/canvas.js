@@ -3,7 +3,7 @@
 const boards = new Set();
 
 export class Board {
-  /** @param {HTMLCanvasElement} canvas @param {(board: Board) => void} paint */
+  /** @param {(board: Board) => void} paint */
   constructor(canvas, paint) {
     this.canvas = canvas;
     this.paint = paint;

@@ -8,7 +8,7 @@ const BETTER = 1.1; // how much larger the area must be from a view that is less
 const ASKEW = 0.4;
 const STEP = Math.PI / 12;
 
-/** Directions on the screen: right and up. @param {{around: number, above: number}} view */
+/** Directions on the screen: right and up. */
 export function axesOf({ around, above }) {
   const [c, s] = [Math.cos(around), Math.sin(around)];
   return { right: [c, s, 0], up: [-s * Math.sin(above), c * Math.sin(above), Math.cos(above)] };
@@ -26,7 +26,7 @@ function variances(paths) {
   return sums;
 }
 
-/** @param {number[][][]} paths In space. @returns {{around: number, above: number}} */
+/** The view from where paths in space are seen best. */
 export function facing(paths) {
   const varied = variances(paths);
   const along = (a, b) =>

@@ -10,7 +10,6 @@ let current = EMPTY;
 let tag = null;
 let loading = null;
 let next = null;
-/** @type {((library: Library) => void)[]} */
 const listeners = [];
 
 /** The library as of the last answer. */
@@ -19,7 +18,7 @@ export const library = () => current;
 /** Whether an answer came at all. */
 export const isLoaded = () => current !== EMPTY;
 
-/** @param {(library: Library) => void} act Called after every change. */
+/** Act after every change. @param {(library: Library) => void} act */
 export const onLibrary = (act) => listeners.push(act);
 
 /** The library as it is now: an answer that is under way may be older, and is followed by one more. */

@@ -22,7 +22,7 @@ async function follow() {
   asking = false;
 }
 
-/** @param {number[]} sample Of the canvas, which is 1 high: a time, across and up. */
+/** A sample of the canvas, which is 1 high, is a time, across and up. */
 export function mirror([, x, y]) {
   const { width, height } = byId("draw-canvas").getBoundingClientRect();
   const half = Math.min(width / height, 1) / 2;

@@ -5,7 +5,6 @@ import { line } from "./lines.js";
 const EDGE = { left: 8, right: 8, top: 18, bottom: 20 };
 
 export class Plot {
-  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     /** @type {Curve[]} */
     this.curves = [];

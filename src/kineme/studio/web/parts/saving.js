@@ -118,7 +118,7 @@ function drawn(canvas, name) {
   );
 }
 
-/** @param {string} canvas Its id. @param {string} kind svg or png */
+/** Save a canvas, by its id, as svg or png. */
 async function save(canvas, kind) {
   const shown = byId(NAMES[canvas]).textContent.trim();
   const name = /\p{L}|\p{N}/u.test(shown) ? shown : "Drawing";

@@ -1,6 +1,6 @@
 // From a mouse, a pen or a finger to samples with the times at which they happened.
 
-/** @param {HTMLCanvasElement} canvas @param {Hearer} hear */
+/** @param {Hearer} hear */
 export function followPointer(canvas, hear) {
   let pointer = null;
   let kind = "";

@@ -16,7 +16,7 @@ export function onShow(view, act) {
 /** The view that is shown. */
 export const currentView = () => current;
 
-/** @param {boolean} focus Whether its tab gets the focus. */
+/** Show a view; its tab may get the focus. */
 export function show(view, focus = false) {
   if (!VIEWS.includes(view)) return;
   for (const name of VIEWS) {

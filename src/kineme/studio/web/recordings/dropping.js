@@ -9,7 +9,7 @@ function state(text, wrong = false) {
   byId("drop-state").classList.toggle("went-wrong", wrong);
 }
 
-/** @returns What the server read, as the person says; undefined where it did not. */
+/** What the server read, as the person says; undefined where it did not. */
 async function send(file, signal) {
   state(`Reading ${file.name} …`);
   const headers = { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" };

@@ -7,7 +7,7 @@ export function askHow({ recording, preview, unclear }, name) {
   const [dialog, table] = [byId("importing"), byId("importing-rows")];
   const form = dialog.querySelector("form");
   form.reset();
-  const heads = preview.heads;
+  const { heads } = preview;
   const row = (head, cells) =>
     make("tr", {}, make("th", { scope: "row" }, head), ...cells.map((cell) => make("td", {}, cell)));
   const box = (type, name, chosen) => (value, k) => {
