@@ -82,7 +82,7 @@ export class Stage {
     const right = near.filter(([u]) => u > px).length;
     const left = px > width - 80 || (px > 80 && right > near.length - right);
     Object.assign(context, { font: `600 14px ${color("--font")}`, textAlign: left ? "right" : "left" });
-    words(context, text, px + (left ? -1 : 1) * (RADIUS + 7), py + 5, token);
+    words(context, text, px + (left ? -1 : 1) * (RADIUS + 7), py + 5, color(token), color("--surface"));
   }
 }
 

@@ -40,7 +40,7 @@ export class Picture {
     const { context } = this.board;
     const ink = this.ink.map((sample) => this.pixel(sample.slice(1)));
     const rest = this.rest.map((point) => this.pixel(point));
-    if (this.turns) ground(context, this.frame.camera, [this.frame.low, this.frame.high]);
+    if (this.turns) ground(context, this.frame.camera, [this.frame.low, this.frame.high], color("--line"));
     if (rest.length && ink.length)
       line(context, [ink.at(-1), ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
     line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });

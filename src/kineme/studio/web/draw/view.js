@@ -42,11 +42,7 @@ function listen(session) {
   const { picture } = session;
   const canvas = byId("draw-canvas");
   for (const follow of [followPointer, followKeys]) follow(canvas, hearerOf(session));
-  followTurns(
-    canvas,
-    () => picture.turns,
-    (dx, dy) => picture.turn(dx, dy),
-  );
+  followTurns(canvas, picture);
   byId("draw-clear").onclick = () => clear(session);
   byId("draw-replay").onclick = () => picture.replay();
   byId("draw-move").onclick = () => move(session);

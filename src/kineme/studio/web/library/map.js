@@ -18,14 +18,15 @@ export class MovementMap {
     this.points = [];
     this.at = -1;
     this.board = new Board(byId("map"), () => this.paint());
-    const canvas = byId("map");
-    canvas.addEventListener("pointermove", (event) => this.point(event));
-    canvas.addEventListener("pointerleave", () => this.show(-1));
-    canvas.addEventListener("click", (event) => {
-      this.point(event);
-      this.choose();
+    Object.assign(byId("map"), {
+      onpointermove: (event) => this.point(event),
+      onpointerleave: () => this.show(-1),
+      onclick: (event) => {
+        this.point(event);
+        this.choose();
+      },
+      onkeydown: (event) => this.key(event),
     });
-    canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
   async load() {
@@ -67,8 +68,9 @@ export class MovementMap {
   /** As many names as fit; the one under the pointer in any case, and clearly. */
   names(pixels) {
     const { context } = this.board;
-    const places = Map.groupBy(pixels, (_, k) => this.points[k].symbol);
-    places.delete(null);
+    const places = new Map();
+    for (const [k, { symbol }] of this.points.entries())
+      if (symbol !== null) places.set(symbol, [...(places.get(symbol) ?? []), pixels[k]]);
     const chosen = this.points[this.at]?.symbol ?? null;
     const taken = places.size > MANY ? pixels.map(([x, y]) => [x - 7, x + 7, y + 4, 12]) : [];
     Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center" });
@@ -87,7 +89,7 @@ export class MovementMap {
     const [x, y] = this.freePlace(members, half, taken);
     if (x === undefined) return;
     taken.push([x - half, x + half, y, 15]);
-    words(context, short, x, y, "--text");
+    words(context, short, x, y, color("--text"), color("--surface"));
   }
 
   /** Above, below or beside the dots of a name, where nothing else stands; [] where there is no room. */

@@ -11,8 +11,6 @@ import { show } from "../parts/views.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { Members } from "./members.js";
 
-const UNLABELED = "";
-
 const action = (text, act, kind = "") => button(text, act, { class: `button ${kind}`, "data-key": `symbol ${text}` });
 
 async function rename(symbol) {
@@ -88,7 +86,7 @@ export class SymbolPanel {
   show() {
     const panel = byId("symbol");
     const symbol = this.opened ? symbolOf(this.opened) : null;
-    if (!symbol && (this.opened !== UNLABELED || !library().unlabeled)) return this.clear();
+    if (!symbol && (this.opened !== "" || !library().unlabeled)) return this.clear();
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");

@@ -61,11 +61,13 @@ export class Handles {
   /** @param {Handle} handle @returns {Grip} */
   add(handle) {
     const { key, kind } = handle;
-    const button = make("button", { class: `handle ${kind}`, type: "button", "data-key": `handle ${key}` });
+    const button = make("button", {
+      ...{ class: `handle ${kind}`, type: "button", "data-key": `handle ${key}` },
+      onpointerdown: (event) => this.grab(grip, event),
+      onkeydown: (event) => this.key(grip, event),
+      ondblclick: () => grip.handle.remove?.(),
+    });
     const grip = { handle, button };
-    button.addEventListener("pointerdown", (event) => this.grab(grip, event));
-    button.addEventListener("keydown", (event) => this.key(grip, event));
-    button.addEventListener("dblclick", () => grip.handle.remove?.());
     byId("handles").append(button);
     return grip;
   }

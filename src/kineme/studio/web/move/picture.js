@@ -32,11 +32,11 @@ export class MovePicture {
     });
     // The page does not scroll with a finger that holds the path.
     canvas.addEventListener("touchstart", (event) => this.under && event.preventDefault(), { passive: false });
-    followTurns(
-      canvas,
-      () => !this.camera.flat && !this.under,
-      (dx, dy) => this.turn(dx, dy),
-    );
+    followTurns(canvas, this);
+  }
+
+  get turns() {
+    return !this.camera.flat && !this.under;
   }
 
   /** Points that must be in the picture: those one can take hold of, and paths unless they run far away. */
@@ -92,7 +92,7 @@ export class MovePicture {
     const { context } = this.board;
     if (!this.plan) return;
     const pixels = (rows) => rows.map((row) => this.camera.toScreen(row));
-    if (!this.camera.flat) ground(context, this.camera, bounds(this.plan.path));
+    if (!this.camera.flat) ground(context, this.camera, bounds(this.plan.path), color("--line"));
     for (const obstacle of this.plan.obstacles) this.paintObstacle(obstacle);
     line(context, pixels(this.plan.path), { color: color("--gray"), width: 7, alpha: 0.28 });
     for (const { path, look } of this.paths)

@@ -30,12 +30,6 @@ export async function request(path, options = {}) {
 
 export const get = async (path) => (await request(path)).json();
 
-/** What is there now and its tag, where that is not the tag of the answer before; else null. */
-export async function newer(path, tag) {
-  const response = await request(path, tag ? { headers: { "If-None-Match": tag } } : {});
-  return response.status === 304 ? null : { body: await response.json(), tag: response.headers.get("ETag") };
-}
-
 const asJson = { "Content-Type": "application/json" };
 const json = (body) => ({ method: "POST", headers: asJson, body: JSON.stringify(body) });
 

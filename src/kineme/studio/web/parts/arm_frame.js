@@ -1,4 +1,4 @@
-// The frame in which an arm is drawn: the scene of three.js and its ids stay in there.
+// The frame in which an arm is drawn: the scene of three.js and its ids stay in there; it may be as high as it says.
 import { fill, make } from "./elements.js";
 
 /**
@@ -11,6 +11,7 @@ export const openArm = (host, address, hear) =>
     window.addEventListener("message", ({ source, data }) => {
       if (source !== frame.contentWindow) return;
       if (data === "ready") done((message) => frame.contentWindow.postMessage(message, location.origin));
+      else if (data.height) frame.style.setProperty("--height", `${data.height}px`);
       else hear(data);
     });
     fill(host, frame);

@@ -28,14 +28,14 @@ export function drag(element, event, go, end = () => {}) {
 }
 
 /** Turn a view in space, while it `turns`, by dragging its background, and by the arrow keys: by pixels. */
-export function followTurns(canvas, turns, turn) {
+export function followTurns(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
-    if (turns()) drag(canvas, event, (now) => turn(now.movementX, now.movementY));
+    if (view.turns) drag(canvas, event, (now) => view.turn(now.movementX, now.movementY));
   });
   canvas.addEventListener("keydown", (event) => {
     const [dx, dy] = ARROWS[event.key] ?? [];
-    if (dx === undefined || !turns()) return;
+    if (dx === undefined || !view.turns) return;
     event.preventDefault();
-    turn(TURN * dx, TURN * dy);
+    view.turn(TURN * dx, TURN * dy);
   });
 }

@@ -1,5 +1,5 @@
 // What the page knows of the library; views are told when it changes, whoever changed it.
-import { newer } from "./api.js";
+import { request } from "./api.js";
 
 /** @type {Library} */
 const EMPTY = {
@@ -7,7 +7,7 @@ const EMPTY = {
   ...{ n_dims: null, channels: null, read_only: false, can_undo: false },
 };
 let current = EMPTY;
-let tag = null;
+let tag = null; // of the answer
 let loading = null;
 let next = null;
 const listeners = [];
@@ -37,9 +37,10 @@ export function refresh() {
 }
 
 async function load() {
-  const answer = await newer("/api/library", tag);
-  if (!answer) return current;
-  ({ body: current, tag } = answer);
+  const answer = await request("/api/library", tag ? { headers: { "If-None-Match": tag } } : {});
+  if (answer.status === 304) return current;
+  current = await answer.json();
+  tag = answer.headers.get("ETag");
   for (const act of listeners) act(current);
   return current;
 }

@@ -1,5 +1,4 @@
 // Lines, marks and words on a canvas.
-import { color } from "./canvas.js";
 
 const CELLS = 6; // of the ground
 
@@ -14,10 +13,10 @@ export function readableOn(hex) {
  * @param {number[][]} points In pixels.
  * @param {{color: string, width?: number, dash?: number[], alpha?: number}} look
  */
-export function line(context, points, { color: paint, width = 3, dash = [], alpha = 1 }) {
+export function line(context, points, { color, width = 3, dash = [], alpha = 1 }) {
   if (points.length < 2) return;
   context.save();
-  Object.assign(context, { strokeStyle: paint, lineWidth: width, globalAlpha: alpha });
+  Object.assign(context, { strokeStyle: color, lineWidth: width, globalAlpha: alpha });
   Object.assign(context, { lineCap: "round", lineJoin: "round" });
   context.setLineDash(dash);
   context.beginPath();
@@ -27,8 +26,8 @@ export function line(context, points, { color: paint, width = 3, dash = [], alph
 }
 
 /** Words that stand out from what they are on. */
-export function words(context, text, x, y, token) {
-  Object.assign(context, { lineWidth: 4, lineJoin: "round", strokeStyle: color("--surface"), fillStyle: color(token) });
+export function words(context, text, x, y, color, surface) {
+  Object.assign(context, { lineWidth: 4, lineJoin: "round", strokeStyle: surface, fillStyle: color });
   context.strokeText(text, x, y);
   context.fillText(text, x, y);
 }
@@ -41,7 +40,7 @@ const CORNERS = {
 };
 
 /** @param {CanvasRenderingContext2D} context @param {number[]} at */
-export function mark(context, [x, y], kind, r, paint) {
+export function mark(context, [x, y], kind, r, color) {
   const corners = CORNERS[kind] ?? [];
   context.save();
   context.translate(x, y);
@@ -49,8 +48,8 @@ export function mark(context, [x, y], kind, r, paint) {
   if (!corners.length) context.arc(0, 0, r, 0, 2 * Math.PI);
   for (let k = 0; k < corners.length; k += 2) context.lineTo(r * corners[k], r * corners[k + 1]);
   context.closePath();
-  if (kind === "ring") Object.assign(context, { strokeStyle: paint, lineWidth: 2 }).stroke();
-  else Object.assign(context, { fillStyle: paint }).fill();
+  if (kind === "ring") Object.assign(context, { strokeStyle: color, lineWidth: 2 }).stroke();
+  else Object.assign(context, { fillStyle: color }).fill();
   context.restore();
 }
 
@@ -60,12 +59,12 @@ export function mark(context, [x, y], kind, r, paint) {
  * @param {Camera} camera
  * @param {number[][]} corners The lowest and the highest.
  */
-export function ground(context, camera, [low, high]) {
+export function ground(context, camera, [low, high], color) {
   const edge = (...ends) =>
     line(
       context,
       ends.map(([x, y]) => camera.toScreen([x, y, low[2]])),
-      { color: color("--line"), width: 1 },
+      { color, width: 1 },
     );
   for (let k = 0; k <= CELLS; k += 1) {
     const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / CELLS);

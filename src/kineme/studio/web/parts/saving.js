@@ -1,15 +1,8 @@
 // "Save picture": what a canvas shows, on white and with its name, as SVG or PNG.
 import { paintOnPaper } from "./canvas.js";
-import { button, byId, make } from "./elements.js";
+import { byId, make } from "./elements.js";
 import { svg } from "./thumbnails.js";
 
-/** Canvas -> the element that says what it shows. */
-const NAMES = {
-  "draw-canvas": "verdict",
-  map: "map-title",
-  "move-canvas": "move-name",
-  "timeline-canvas": "recording-name",
-};
 const HEAD = 40; // height of the name [px]
 const SHARP = 2; // pixels of a PNG for one on the screen
 
@@ -118,9 +111,9 @@ function drawn(canvas, name) {
   );
 }
 
-/** Save a canvas, by its id, as svg or png. */
-async function save(canvas, kind) {
-  const shown = byId(NAMES[canvas]).textContent.trim();
+/** Save a canvas, by its id, as svg or png, with the name that an element says. */
+async function save(canvas, naming, kind) {
+  const shown = byId(naming).textContent.trim();
   const name = /\p{L}|\p{N}/u.test(shown) ? shown : "Drawing";
   const picture = drawn(byId(canvas), name);
   let href = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(picture))}`;
@@ -134,21 +127,12 @@ async function save(canvas, kind) {
   make("a", { href, download: `${name}.${kind}` }).click();
 }
 
-/** A control below each picture. */
+/** Listen to the control of each picture. */
 export function startSaving() {
-  for (const canvas of Object.keys(NAMES)) {
-    const menu = make("details", "saving", make("summary", "button quiet", "Save picture"));
-    const act = (kind) => () => {
-      menu.open = false;
-      save(canvas, kind);
-    };
-    for (const kind of ["svg", "png"]) menu.append(button(kind.toUpperCase(), act(kind)));
-    const stage = byId(canvas).closest(".stage");
-    const row =
-      canvas === "move-canvas" // where many controls are
-        ? byId("move-advanced")
-        : stage.parentElement.querySelector(":scope > .stage ~ .row:not(.nowrap)");
-    if (row) row.append(menu);
-    else stage.after(menu);
-  }
+  for (const menu of document.querySelectorAll(".saving"))
+    for (const choice of menu.querySelectorAll("button"))
+      choice.onclick = () => {
+        menu.removeAttribute("open");
+        save(menu.dataset.picture, menu.dataset.name, choice.textContent.toLowerCase());
+      };
 }

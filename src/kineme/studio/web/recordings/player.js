@@ -16,8 +16,8 @@ export class Player {
     /** @type {Video|null} The one that is shown, unless the browser cannot play it. */
     this.video = null;
     this.film = byId("video");
-    this.film.addEventListener("error", () => this.fail());
-    this.film.addEventListener("loadedmetadata", () => (this.film.videoWidth ? this.follow() : this.fail()));
+    this.film.onerror = () => this.fail();
+    this.film.onloadedmetadata = () => (this.film.videoWidth ? this.follow() : this.fail());
     byId("video-start").oninput = () => {
       if (this.video) this.video.start = byId("video-start").valueAsNumber || 0;
       this.follow();

@@ -89,8 +89,9 @@ export class Strip {
   /** What was found, in words: symbols with their counts, the most frequent first. */
   say() {
     const { spans, problems, corrected } = this.episode;
-    const found = Map.groupBy(spans, ({ label }) => label ?? "unknown");
-    const names = [...found].map(([name, { length }]) => [name, length]).sort((a, b) => b[1] - a[1]);
+    const counts = new Map();
+    for (const { label } of spans) counts.set(label ?? "unknown", (counts.get(label ?? "unknown") ?? 0) + 1);
+    const names = [...counts].sort((a, b) => b[1] - a[1]);
     const words = [];
     if (names.length > NAMED) words.push(`${names.length - NAMED} more`);
     if (corrected) words.push("corrected");

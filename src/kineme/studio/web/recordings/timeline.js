@@ -32,11 +32,13 @@ export class Timeline {
     this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
     byId("edges").append(this.playhead);
     this.edges = ["begin", "end"].map((which) => this.edge(which));
-    canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    canvas.addEventListener("keydown", (event) => this.key(event));
-    canvas.addEventListener("dblclick", () => (this.chosen < 0 ? this.page.add() : this.name()));
-    canvas.tabIndex = 0;
+    Object.assign(canvas, {
+      tabIndex: 0,
+      onpointerdown: (event) => this.grab(event),
+      onwheel: (event) => this.wheel(event),
+      onkeydown: (event) => this.key(event),
+      ondblclick: () => (this.chosen < 0 ? this.page.add() : this.name()),
+    });
   }
 
   show(plot) {
@@ -104,21 +106,21 @@ export class Timeline {
 
   edge(which) {
     const look = { class: "edge", type: "button", role: "slider", hidden: true };
-    const button = make("button", { ...look, "data-key": `edge ${which}` });
     const go = (now) => this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
-    button.addEventListener("pointerdown", (event) => {
+    const onpointerdown = (event) => {
       if (!drag(button, event, go, () => this.page.changed())) return;
       event.preventDefault();
       button.focus({ preventScroll: true });
-    });
-    button.addEventListener("keydown", (event) => {
+    };
+    const onkeydown = (event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
       if (!step) return this.key(event);
       event.preventDefault();
       const by = (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500;
       this.moveEdge(which, this.spans[this.chosen][which] + by);
       this.page.changed();
-    });
+    };
+    const button = make("button", { ...look, "data-key": `edge ${which}`, onpointerdown, onkeydown });
     byId("edges").append(button);
     return { which, button };
   }

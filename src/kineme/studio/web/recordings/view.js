@@ -1,12 +1,12 @@
 // Recordings: a file, its channels, what was found in it, corrected, played, saved and learned.
-import { download, get, path, post } from "../parts/api.js";
+import { get, path, post } from "../parts/api.js";
 import { learnSpans, undo } from "../parts/changes.js";
 import { byId, counted, fill, make, offer } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
 import { Steps } from "../parts/steps.js";
 import { isRedo, isUndo } from "../parts/shortcuts.js";
-import { tried } from "../parts/toasts.js";
+import { save, tried } from "../parts/toasts.js";
 import { currentView } from "../parts/views.js";
 import { startDropping } from "./dropping.js";
 import { Episodes } from "./episodes.js";
@@ -46,7 +46,7 @@ export class Recordings {
       "add-span": () => this.add(),
       "undo-span": () => this.step(-1),
       "redo-span": () => this.step(1),
-      "save-spans": () => tried(this.save()),
+      "save-spans": () => this.save(),
       "learn-spans": () => this.learn(),
       "learn-file": () => learnSpans(this.read.recording, { channels: this.chosenChannels() }),
       "read-as": () => this.readAs(),
@@ -232,7 +232,7 @@ export class Recordings {
   /** The spans as a file, in a format of the shell. */
   save() {
     const asked = { ...this.body(), spans: plain(this.timeline.spans), format: byId("save-format").value };
-    return download(this.path("annotations"), asked, "annotations");
+    return save(this.path("annotations"), asked, "annotations");
   }
 
   remove(k) {

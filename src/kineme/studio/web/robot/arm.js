@@ -24,9 +24,10 @@ function chart({ times, positions, begins }, { name, low, high }, k) {
 }
 
 const viewer = window.kineme;
+const tell = (message) => parent.postMessage(message, location.origin);
 const { classList } = document.body;
 classList.toggle("mini", location.search === "?mini");
-if (location.search !== "?mini") viewer.moved = (end, point) => parent.postMessage({ end, point }, location.origin);
+if (location.search !== "?mini") viewer.moved = (end, point) => tell({ end, point });
 
 window.addEventListener("message", ({ origin, source, data: { scene, joints, posture } }) => {
   if (origin !== location.origin || source !== parent) return;
@@ -37,4 +38,6 @@ window.addEventListener("message", ({ origin, source, data: { scene, joints, pos
   classList.toggle("rests", scene.times.length < 2);
   if (scene.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches) viewer.play();
 });
-parent.postMessage("ready", location.origin);
+byId("save-picture").onclick = () => make("a", { href: viewer.picture(), download: "arm.png" }).click();
+new ResizeObserver(() => tell({ height: document.body.offsetHeight })).observe(document.body);
+tell("ready");

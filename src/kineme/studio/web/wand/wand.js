@@ -90,12 +90,12 @@ async function release() {
 
 followPointer(byId("wand-canvas"), hearer);
 window.addEventListener("deviceorientation", turned);
-button.addEventListener("pointerdown", (event) => {
+button.onpointerdown = (event) => {
   button.setPointerCapture(event.pointerId);
   button.classList.add("held");
   hearer.begins("wand");
-});
-button.addEventListener("lostpointercapture", release);
-button.addEventListener("contextmenu", (event) => event.preventDefault());
+};
+button.onlostpointercapture = release;
+button.oncontextmenu = () => false; // no menu
 setInterval(tell, BEAT);
 tell();
