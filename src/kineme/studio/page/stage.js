@@ -32,7 +32,7 @@ class View extends Camera {
 }
 
 export class Stage {
-  /** In view, see `View`, is a box in the unit of the movements. @param {Box} box */
+  /** A box is in view, in the unit of the movements; see `View`. @param {Box} box */
   constructor(canvas, first, box, paint) {
     this.box = box;
     this.camera = new View(first);

@@ -14,7 +14,7 @@ export function takesDrawings() {
   return dims === 3 && symbols.every((symbol) => !symbol.path || isPlane(symbol.path));
 }
 
-/** Show it, or the canvas that is filled by a movement. */
+/** Show the invitation, or the canvas that a movement has filled. */
 export function showInvitation(filled) {
   const [{ symbols }, takes] = [library(), takesDrawings()];
   showLegend(filled);

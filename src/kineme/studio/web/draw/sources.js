@@ -4,7 +4,7 @@ import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 const MOST = 10000; // samples that are held of a movement, the last ones
 
 export class Sources {
-  /** Fewer there are where a program is gone or ignored. */
+  /** There are fewer where a program is gone or ignored. */
   constructor(changed, fewer) {
     this.changed = changed;
     this.fewer = fewer;
@@ -14,7 +14,7 @@ export class Sources {
     this.ignored = new Set(); // names: a program that comes back stays ignored
   }
 
-  /** News of one source, by the server. @param {Source} news */
+  /** Hear news of a source. @param {Source} news */
   hear(news) {
     if (news.gone) return this.forget(news.id);
     const before = this.connected.get(news.id);

@@ -37,8 +37,14 @@ function move({ label }) {
   show("move", true);
 }
 
-/** @param {DrawSession} session */
-function listen(session) {
+/** Start the view. @returns What hears the server. */
+export function startDraw(send) {
+  const session = createSession(send);
+  const sources = startFollowing(session);
+  session.naming = startNaming({
+    movement: () => session.movement,
+    learned: (name) => showLearned(session, name),
+  });
   const { picture } = session;
   const canvas = byId("draw-canvas");
   for (const follow of [followPointer, followKeys]) follow(canvas, hearerOf(session));
@@ -59,21 +65,10 @@ function listen(session) {
       const { example } = button.dataset;
       if ((await learnExample(example)) && example === "arm") show("robot", true);
     };
-}
-
-/** Start the view. @returns What hears the server. */
-export function startDraw(send) {
-  const session = createSession(send);
-  const sources = startFollowing(session);
-  session.naming = startNaming({
-    movement: () => session.movement,
-    learned: (name) => showLearned(session, name),
-  });
-  listen(session);
   for (const host of document.querySelectorAll("[data-host]")) host.textContent = location.host;
-  followGamepad(byId("draw-canvas"), hearerOf(session), sources);
+  followGamepad(canvas, hearerOf(session), sources);
   offerPhone();
-  sources.hand = handPen(session.picture, hearerOf(session));
+  sources.hand = handPen(picture, hearerOf(session));
   window.addEventListener("kineme-hand", (event) => sources.hand(/** @type {CustomEvent} */ (event).detail));
   return {
     state: (state) => showState(session, state),

@@ -12,7 +12,7 @@ const NEAR = 18; // how close a pointer must be [px]
 const MANY = 40; // symbols, whose names would cover the dots
 
 export class MovementMap {
-  /** Opens a symbol, or "" for a movement without one. */
+  /** `open` opens a symbol, or "" for a movement without one. */
   constructor(open) {
     this.open = open;
     this.points = [];
@@ -80,7 +80,7 @@ export class MovementMap {
     if (chosen !== null) this.name(chosen, places.get(chosen), []);
   }
 
-  /** Taken is from where to where, on which line, how far from it; this name is added. */
+  /** Write a name; `taken` is from where to where, on which line, how far from it, and gets this one. */
   name(id, members, taken) {
     const { context } = this.board;
     const name = symbolOf(id)?.name ?? "";

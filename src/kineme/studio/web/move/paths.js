@@ -29,13 +29,9 @@ export function showPaths(session) {
   session.speed.show(curves("velocities"));
   session.acceleration.show(curves("accelerations"));
   showLegend(session);
-  showWarnings(names.map((name) => rollouts.get(name)));
-}
-
-/** Say what is wrong with paths, each once. */
-function showWarnings(rollouts) {
-  const warnings = rollouts.flatMap(({ problem, path }) => [problem, ...(path?.warnings ?? [])]).filter(Boolean);
-  write(byId("move-warnings"), [...new Set(warnings)].join("; "));
+  const all = names.map((name) => rollouts.get(name));
+  const warnings = all.flatMap(({ problem, path }) => [problem, ...(path?.warnings ?? [])]).filter(Boolean);
+  write(byId("move-warnings"), [...new Set(warnings)].join("; ")); // each once
 }
 
 /** Name the paths; while they follow the hand, the names are not written anew. @param {MoveSession} session */

@@ -12,17 +12,14 @@ import { showPick } from "./pick.js";
 import { chooseSymbol, saveMovement, tickFormulations } from "./requests.js";
 import { Session } from "./session.js";
 
-/** Hide the parts of the view where no symbol can move, and say so. */
-function showParts(empty) {
-  byId("move-empty").hidden = !empty;
-  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
-}
+const PARTS = ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]; // shown where a symbol can move
 
 /** The view is shown, or the library changed. @param {MoveSession} session */
 function showView(session) {
   const { symbols, version } = library();
   const id = toMove(symbols);
-  showParts(id === null);
+  byId("move-empty").hidden = id !== null;
+  for (const part of PARTS) byId(part).hidden = id === null;
   showPick(id, (chosen) => chooseSymbol(session, chosen));
   if (id === null) session.plan = session.picture.plan = session.chosen = null;
   else if (session.chosen?.symbol !== id || session.version !== version) chooseSymbol(session, id);
@@ -41,8 +38,9 @@ function hearKey(session, event) {
   }
 }
 
-/** @param {MoveSession} session */
-function listen(session) {
+export function startMove() {
+  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
+  startFormulations((names) => tickFormulations(session, names));
   byId("move-play").onclick = () => play(session);
   byId("add-via").onclick = () => addVia(session);
   byId("add-obstacle").onclick = () => addObstacle(session);
@@ -55,10 +53,4 @@ function listen(session) {
   const pick = () => showPick(session.plan?.symbol ?? null, (chosen) => chooseSymbol(session, chosen));
   startFinding(byId("find-pick"), pick, () => byId("move-pick").querySelector("input"));
   onShow("move", () => showView(session));
-}
-
-export function startMove() {
-  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
-  startFormulations((names) => tickFormulations(session, names));
-  listen(session);
 }

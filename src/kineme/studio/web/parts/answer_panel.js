@@ -121,7 +121,7 @@ export class AnswerPanel {
     if (label !== null && certainty) this.speak(`Looks like ${name}, so far.`);
   }
 
-  /** Of the whole movement. Explain gives its explanation, or a promise of it. */
+  /** Of the whole movement; `explain` gives its explanation, or a promise of it. */
   final(answer, explain) {
     const { label, certainty, ranked, rule, p_known: known, promise } = answer;
     const [name, word] = [label ?? ranked[0].label, capital(certainty)];

@@ -9,7 +9,7 @@ class Refused extends Error {
   }
 }
 
-/** An address in which what varies may hold any character. */
+/** An address; the values in it may hold any character. */
 export const path = (parts, ...values) => String.raw({ raw: parts }, ...values.map(encodeURIComponent));
 
 /** @returns {Promise<Response>} */

@@ -2,7 +2,7 @@
 
 const MANY = 12;
 
-/** What has changed is shown anew; Enter presses the first that is found. */
+/** Show what is found whenever the field has changed; Enter presses the first. */
 export function startFinding(field, changed, first) {
   field.addEventListener("input", changed);
   field.addEventListener("keydown", (event) => event.key === "Enter" && first()?.click());

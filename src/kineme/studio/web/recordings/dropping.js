@@ -26,17 +26,17 @@ async function send(file, signal) {
   }
 }
 
-/** A recording that was read goes to `read`; `film` takes a video, where it may. */
-export function startDropping(read, film) {
+/** A recording that was read is opened; a video is added to the one that is. @param {import("./view.js").Recordings} page */
+export function startDropping(page) {
   let sending = new AbortController();
   const take = async (files) => {
     const file = files?.[0];
-    if (!file || (file.type.startsWith("video/") && film(file))) return;
+    if (!file || (page.read && file.type.startsWith("video/") && page.player.add(file))) return;
     sending.abort(); // only the last file is wanted
     sending = new AbortController();
     const recording = await send(file, sending.signal);
     if (!recording) return;
-    read(recording, file.name);
+    page.open(recording, file.name);
     const others = files.length - 1;
     if (others) state(`One file at a time: ${file.name} is shown, ${counted(others, "other")} not read.`);
   };

@@ -2,16 +2,17 @@
 import { get, path, post } from "../parts/api.js";
 import { ask } from "../parts/dialogs.js";
 import { byId, counted, fill, write } from "../parts/elements.js";
-import { onLibrary } from "../parts/library_state.js";
+import { library, onLibrary } from "../parts/library_state.js";
 import { say, tried } from "../parts/toasts.js";
 import { onShow } from "../parts/views.js";
+import { fitting } from "./fitting.js";
 import { plain } from "./spans.js";
 import { Strip } from "./strip.js";
 
 const PAGE = 20; // episodes
 
 export class Episodes {
-  /** The page opens episodes, tells their channels, and hears of what was found in them. */
+  /** @param {import("./view.js").Recordings} page */
   constructor(page) {
     this.page = page;
     this.offset = 0;
@@ -88,7 +89,8 @@ export class Episodes {
     this.opened = detail.recording;
     this.mark();
     for (const video of detail.videos) video.address = path`/api/episodes/${detail.recording}/videos/${video.camera}`;
-    this.page.open(detail);
+    const { number, task, place } = detail.episode;
+    this.page.open(detail, `Episode ${number}: ${task ?? place}`);
   }
 
   /** Keep what an episode shows, and whether a person has corrected any. */
@@ -126,7 +128,7 @@ export class Episodes {
         });
         if (!spans) continue;
         await this.put(episode.key, spans, false);
-        this.page.spotted(episode.key, spans);
+        if (this.page.read?.recording === episode.key) this.page.spotted(spans);
         done += 1;
       }
       write(byId("episodes-state"), `Looked through ${counted(done, "episode")}.`);
@@ -143,7 +145,10 @@ export class Episodes {
 
   /** What happens when in an episode. */
   async find(key, signal) {
-    this.channels ??= this.page.channels(await get(path`/api/episodes/${key}`));
+    if (!this.channels) {
+      const { tables, chosen } = await get(path`/api/episodes/${key}`);
+      this.channels = [...fitting(tables[0].channels, library(), chosen)];
+    }
     return (await post(path`/api/recordings/${key}/spotted`, { channels: this.channels }, signal)).spans;
   }
 

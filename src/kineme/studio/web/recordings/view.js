@@ -31,16 +31,8 @@ export class Recordings {
     this.timeline = new Timeline(this);
     this.shape = new ShapeView();
     this.player = new Player((time) => this.goTo(time));
-    this.episodes = new Episodes({
-      open: (detail) =>
-        this.open(detail, `Episode ${detail.episode.number}: ${detail.episode.task ?? detail.episode.place}`),
-      channels: ({ tables, chosen }) => [...fitting(tables[0].channels, library(), chosen)],
-      spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
-    });
-    startDropping(
-      (recording, name) => this.open(recording, name),
-      (file) => Boolean(this.read) && this.player.add(file),
-    );
+    this.episodes = new Episodes(this);
+    startDropping(this);
     for (const [id, act] of Object.entries({
       spot: () => (this.search ? this.search.abort() : this.spot()),
       "add-span": () => this.add(),
