@@ -31,8 +31,8 @@ export function product(a, i, b, j, n) {
 
 /**
  * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before, are
- * written from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait for each
- * other, so that this takes a third of the time of `product`.
+ * written from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait
+ * for each other, so that this takes a third of the time of `product`.
  */
 export function ninefold(a, i, b, j, step, n, into, at, N) {
   let xu = 0;

@@ -12,14 +12,13 @@ import { showPick } from "./pick.js";
 import { chooseSymbol, saveMovement, tickFormulations } from "./requests.js";
 import { Session } from "./session.js";
 
-const PARTS = ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]; // shown where a symbol can move
-
 /** The view is shown, or the library changed. @param {MoveSession} session */
 function showView(session) {
   const { symbols, version } = library();
   const id = toMove(symbols);
   byId("move-empty").hidden = id !== null;
-  for (const part of PARTS) byId(part).hidden = id === null;
+  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"])
+    byId(part).hidden = id === null;
   showPick(id, (chosen) => chooseSymbol(session, chosen));
   if (id === null) session.plan = session.picture.plan = session.chosen = null;
   else if (session.chosen?.symbol !== id || session.version !== version) chooseSymbol(session, id);

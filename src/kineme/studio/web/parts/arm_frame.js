@@ -11,7 +11,7 @@ export const openArm = (host, address, hear) =>
     window.addEventListener("message", ({ source, data }) => {
       if (source !== frame.contentWindow) return;
       if (data === "ready") done((message) => frame.contentWindow.postMessage(message, location.origin));
-      else if (data.height) frame.style.setProperty("--height", `${data.height}px`);
+      else if ("height" in data) frame.style.setProperty("--height", `${data.height}px`);
       else hear(data);
     });
     fill(host, frame);

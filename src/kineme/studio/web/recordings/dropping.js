@@ -26,7 +26,7 @@ async function send(file, signal) {
   }
 }
 
-/** A recording that was read is opened; a video is added to the one that is. @param {import("./view.js").Recordings} page */
+/** A file that was read is opened; a video is added to what is. @param {import("./view.js").Recordings} page */
 export function startDropping(page) {
   let sending = new AbortController();
   const take = async (files) => {
