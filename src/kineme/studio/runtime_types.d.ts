@@ -1,8 +1,14 @@
 // What the type checker knows of the records of the runtime, which lies in javascript/. No browser loads it.
 
+/** Everything of a snapshot that is no array. */
+interface Header {
+  calibration: Calibration;
+  early: { numbers: EarlyNumbers; pauses: PauseRule; rule: RotationRule; shapes: PairRule; [name: string]: any };
+  [name: string]: any;
+}
+
 interface Snapshot {
-  /** Everything that is no array. */
-  header: any;
+  header: Header;
   arrays: Record<string, any>;
 }
 
