@@ -762,7 +762,15 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     frame.locator("#play:text-is('Pause')").wait_for()  # it moves by itself
     assert frame.locator(".chart .limit").count() > 0
     assert page.is_hidden("#robot-dragged")
-    page.keyboard.press("3")
+    with page.expect_download() as given:
+        frame.locator("#save-picture").click()
+    assert given.value.suggested_filename == "arm.png"
+    assert given.value.path().read_bytes().startswith(b"\x89PNG")
+    page.set_viewport_size({"width": 390, "height": 844})
+    inside = page.frames[-1]  # as high as what is in it
+    wait_until(inside, "document.documentElement.scrollHeight <= innerHeight && innerHeight > 500")
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.locator("#tab-robot").press("3")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
     page.locator(".handle.goal").press("Shift+ArrowLeft")
     with page.expect_request("**/api/robots/move") as request:

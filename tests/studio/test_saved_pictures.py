@@ -44,27 +44,30 @@ def page(browser, tmp_path_factory):
     studio.end()
 
 
-def saved(page, view, kind):
-    """The file that the control of a view gives, its name and bytes."""
+def saved(page, view, canvas, kind):
+    """The file that the control of a picture gives, its name and bytes."""
     show(page, view)
-    page.click(f"#view-{view} .saving summary")
+    control = page.locator(f"#view-{view} .saving[data-picture={canvas}]")
+    control.locator("summary").click()
     with page.expect_download() as given:
-        page.click(f"#view-{view} .saving button:text('{kind}')")
+        control.locator(f"button:text('{kind}')").click()
     assert page.locator(f"#view-{view} .saving[open]").count() == 0
     return given.value.suggested_filename, given.value.path().read_bytes()
 
 
 @pytest.mark.parametrize(
-    ("view", "name", "holds"),
+    ("view", "canvas", "name", "holds"),
     [
-        ("draw", "GShape", f'stroke="{INK}"'),
-        ("library", "Map", ">GShape</text>"),
-        ("move", None, 'stroke-width="3.5"'),
-        ("recordings", "long & <b>.csv", ">s</text>"),
+        ("draw", "draw-canvas", "GShape", f'stroke="{INK}"'),
+        ("library", "map", "Map", ">GShape</text>"),
+        ("move", "move-canvas", None, 'stroke-width="3.5"'),
+        ("move", "plot-speed", "Speed", ">0 s</text>"),
+        ("move", "plot-acceleration", "Acceleration", 'stroke-width="2.2"'),
+        ("recordings", "timeline-canvas", "long & <b>.csv", ">s</text>"),
     ],
 )
-def test_a_picture_is_saved_with_its_name_on_white(page, view, name, holds):
-    file, content = saved(page, view, "SVG")
+def test_a_picture_is_saved_with_its_name_on_white(page, view, canvas, name, holds):
+    file, content = saved(page, view, canvas, "SVG")
     root = ElementTree.fromstring(content)
     title = root.findtext(f"{SVG}title")
     assert (name or title) == title != ""
@@ -78,7 +81,7 @@ def test_a_picture_is_saved_with_its_name_on_white(page, view, name, holds):
     assert root.findall(f"{SVG}text")[0].text == title
 
     Image = pytest.importorskip("PIL.Image", reason="the package pillow is not installed")
-    file, content = saved(page, view, "PNG")
+    file, content = saved(page, view, canvas, "PNG")
     assert file.endswith(".png")
     pixels = np.asarray(Image.open(io.BytesIO(content)).convert("RGB"))
     assert pixels.shape[:2] == (2 * int(root.get("height")), 2 * int(root.get("width")))
@@ -90,7 +93,7 @@ def test_the_screen_stays_as_dark_as_it_was(page):
     show(page, "draw")
     ink = "[...document.getElementById('draw-canvas').getContext('2d').getImageData(0, 0, 1500, 1500).data]"
     before = page.evaluate(f"{ink}.reduce((sum, value) => sum + value, 0)")
-    saved(page, "draw", "SVG")
+    saved(page, "draw", "draw-canvas", "SVG")
     settle(page)
     assert page.evaluate(f"{ink}.reduce((sum, value) => sum + value, 0)") == before
 
@@ -99,5 +102,6 @@ def test_the_control_is_within_a_narrow_window(page):
     page.set_viewport_size({"width": 390, "height": 844})
     for view in ("draw", "library", "move", "recordings"):
         show(page, view)
-        box = page.locator(f"#view-{view} .saving").bounding_box()
-        assert 0 <= box["x"] <= box["x"] + box["width"] <= 390
+        for control in page.locator(f"#view-{view} .saving").all():
+            box = control.bounding_box()
+            assert 0 <= box["x"] <= box["x"] + box["width"] <= 390

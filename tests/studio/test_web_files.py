@@ -20,6 +20,7 @@ SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
 MAX_FILE, MAX_LINE = 400, 120
+MOST_BYTES = 336_000  # of all JavaScript of the studio
 needs_node = pytest.mark.skipif(NODE is None, reason=REASON)
 
 
@@ -405,8 +406,10 @@ def test_every_id_is_one_elements_and_is_used():
 
 def test_types_of_elements_by_their_ids_are_those_of_the_pages():
     """The table by which the type checker knows what `byId` gives."""
-    table = (WEB / "parts" / "elements.js").read_text()
-    kinds = dict(re.findall(r'^ \*   "?([\w-]+)"?: HTML(\w+)Element,$', table, re.MULTILINE))
+    table = (WEB.parent / "types.d.ts").read_text().partition("type ElementOf")[0]
+    records = re.findall(r"Record<([^>]*),\s*HTML(\w+)Element", table)
+    kinds = {name: kind for names, kind in records for name in re.findall(r'"([\w-]+)"', names)}
+    assert len(kinds) > 80
     tags = [
         (name, tag)
         for page in (*PAGES, *PAGE.glob("*.html"))
@@ -425,6 +428,10 @@ def test_what_a_module_exports_is_imported():
         if not any(re.search(rf"\b{name}\b", other) for there, other in every.items() if there != path)
     }
     assert not exported
+
+
+def test_the_scripts_of_the_studio_are_no_larger_than_they_must_be():
+    assert sum(path.stat().st_size for path in WEB.parent.rglob("*.js")) <= MOST_BYTES
 
 
 def test_only_the_tokens_know_colors():

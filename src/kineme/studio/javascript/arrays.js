@@ -1,21 +1,11 @@
 // A snapshot of a library: JSON with one block of numbers in base64, as kineme.studio.snapshot writes it.
 
-/**
- * @typedef {Object} Snapshot
- * @property {Object} header everything that is no array
- * @property {Object<string, Float64Array|Float32Array|Int32Array>} arrays
- */
-
 const KINDS = { float64: Float64Array, float32: Float32Array, int32: Int32Array };
 const FORMAT = "kineme-snapshot";
 const VERSION = 6;
 const SMALLEST = 2.2250738585072014e-308; // number whose logarithm is taken
 
-/**
- * The arrays of a snapshot; they share one block of memory.
- * @param {string|Object} text a JSON document, or what was parsed of it
- * @returns {Snapshot}
- */
+/** The arrays of a snapshot, in JSON or parsed; they share one block of memory. @returns {Snapshot} */
 export function unpack(text) {
   const given = typeof text === "string" ? JSON.parse(text) : text;
   if (given.format !== FORMAT || given.version !== VERSION) {
@@ -32,14 +22,7 @@ export function unpack(text) {
   return { header, arrays };
 }
 
-/**
- * Sum of products of two rows of n numbers that begin at i and j.
- * @param {ArrayLike<number>} a
- * @param {number} i
- * @param {ArrayLike<number>} b
- * @param {number} j
- * @param {number} n
- */
+/** Sum of products of two rows of n numbers that begin at i and j. */
 export function product(a, i, b, j, n) {
   let total = 0;
   for (let k = 0; k < n; k++) total += a[i + k] * b[j + k];
@@ -47,12 +30,9 @@ export function product(a, i, b, j, n) {
 }
 
 /**
- * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before; written
- * from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait for each
- * other, so that this takes a third of the time of `product`.
- * @param {Float32Array} a
- * @param {Float32Array} b
- * @param {Float64Array} into
+ * Inner products of three rows of n numbers with three others, from i and j on, each `step` after the one before, are
+ * written from `at` on, N numbers for a row. Each number is read once for three of them, and the nine sums do not wait
+ * for each other, so that this takes a third of the time of `product`.
  */
 export function ninefold(a, i, b, j, step, n, into, at, N) {
   let xu = 0;
@@ -92,13 +72,7 @@ export function ninefold(a, i, b, j, step, n, into, at, N) {
   into[at + 2 * N + 2] = zw;
 }
 
-/**
- * Linear interpolation at rising targets of a function with values y at rising x; constant beyond its ends.
- * @param {ArrayLike<number>} targets
- * @param {ArrayLike<number>} x
- * @param {ArrayLike<number>} y
- * @returns {Float64Array}
- */
+/** Linear interpolation at rising targets of a function with values y at rising x; constant beyond its ends. */
 export function interpolate(targets, x, y) {
   const interpolated = new Float64Array(targets.length);
   const last = x.length - 1;
@@ -112,31 +86,27 @@ export function interpolate(targets, x, y) {
   return interpolated;
 }
 
-/** Numbers from a to b at n even steps. @returns {Float64Array} */
+/** Numbers from a to b at n even steps. */
 export function linspace(a, b, n) {
   return Float64Array.from({ length: n }, (_, k) => (k === n - 1 ? b : a + ((b - a) * k) / (n - 1)));
 }
 
-/** Index of the largest number; of several the first. @param {ArrayLike<number>} values */
+/** Index of the largest number; of several the first. */
 export function argmax(values) {
   let best = 0;
   for (let k = 1; k < values.length; k++) if (values[k] > values[best]) best = k;
   return best;
 }
 
-/**
- * Indices of the numbers, largest first; of equal ones the first.
- * @param {ArrayLike<number>} values
- * @returns {number[]}
- */
+/** Indices of the numbers, largest first; of equal ones the first. */
 export function descending(values) {
   return Array.from(values, (_, k) => k).sort((i, j) => (values[j] === values[i] ? i - j : values[j] - values[i]));
 }
 
-/** Logarithm of a number that is not negative; finite for 0. @param {number} value */
+/** Logarithm of a number that is not negative; finite for 0. */
 export const finiteLog = (value) => Math.log(Math.max(value, SMALLEST));
 
-/** log(sum(exp(values))), without overflow. @param {ArrayLike<number>} values */
+/** log(sum(exp(values))), without overflow. */
 export function logSumExp(values) {
   const top = values[argmax(values)];
   if (!Number.isFinite(top)) return top;
@@ -145,7 +115,7 @@ export function logSumExp(values) {
   return Math.log(sum) + top;
 }
 
-/** Shares of numbers given by their logarithms: none negative, their sum 1. @returns {Float64Array} */
+/** Shares of numbers given by their logarithms: none negative, their sum 1. */
 export function softmax(logs) {
   const top = logSumExp(logs);
   return Float64Array.from(logs, (log) => Math.exp(log - top));

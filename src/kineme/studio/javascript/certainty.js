@@ -1,9 +1,7 @@
 // How sure an answer is, in one of four words, as kineme.recognition.answer says it; thresholds are the snapshot's.
 
 /**
- * @param {Object<string, number>} least word -> the least confidence that it takes
- * @param {number} confidence
- * @param {{isNew: boolean, isGuess?: boolean}} what
+ * The word; `least` is the least confidence that each takes.
  * @returns {"sure"|"probably"|"looks like"|"new"}
  */
 export function certainty(least, confidence, { isNew, isGuess = false }) {

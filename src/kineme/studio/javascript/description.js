@@ -8,35 +8,7 @@ const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scal
 const NO_LENGTH = 1e-6; // of a movement of size 1: a shorter vector has no direction
 export const N_POINTS = 199; // even samples from which the phases are computed
 
-/**
- * @typedef {Object} Representation
- * @property {string} quantity positions, forcing, elastic, turning or cloud
- * @property {number} arc_share
- * @property {number} n_points
- * @property {string} name
- *
- * @typedef {Object} Stored m movements as they are compared
- * @property {number} m
- * @property {Float32Array[]} rows of each block, one movement after the other
- * @property {Float64Array[]} squares their squared norms, (m,) of each block
- * @property {Shapes|null} shapes
- * @property {Shapes|null} details
- *
- * @typedef {Object} Shapes segments and points of m movements, see `shapes`
- * @property {number} d numbers of a vector
- * @property {Float32Array} segments m times K times (tangent, midpoint, turning angle / pi)
- * @property {Float32Array} points m times P times (point, turning angle / pi, tangent)
- * @property {number} n_segments K
- * @property {number} n_points P
- */
-
-/**
- * A path at even values of a phase: d rows of n_points numbers.
- * @param {Float64Array|Float32Array} path d rows
- * @param {number} d
- * @param {{arc_share: number, n_points: number, signal: boolean}} representation
- * @param {Float64Array} [matrix] (n_points, n) where time does not fall on samples
- */
+/** A path at even values of a phase: d rows of n_points numbers, by a matrix where time does not fall on samples. */
 function along(path, d, representation, matrix) {
   const n = path.length / d;
   const m = representation.n_points;
@@ -91,11 +63,8 @@ function forcing(path, d, operator, translation) {
 }
 
 /**
- * Feature rows of a smooth path, one of each representation that is compared sample by sample.
- * @param {Float64Array} path d rows, relative, or as recorded where position matters
- * @param {Object} how the header's comparison
- * @param {Object} arrays of the snapshot
- * @returns {Float32Array[]}
+ * Feature rows of a smooth path, one of each representation that is compared sample by sample; the path is relative, or
+ * as recorded where position matters.
  */
 export function featureRows(path, how, arrays) {
   const d = how.n_dims;
@@ -109,10 +78,7 @@ export function featureRows(path, how, arrays) {
 
 /**
  * Write a row of J points (J, d, n) with the x of all points first: one movement of J n samples, which turns as one.
- * @param {Float32Array} into from `at` on
- * @param {number} at
- * @param {Float32Array|Float64Array} row
- * @param {import("./rotation.js").Rule} rule
+ * It is written from `at` on.
  */
 export function setRow(into, at, row, { n_dims: d, n_points: J }) {
   const n = row.length / (d * J);
@@ -137,11 +103,7 @@ function mixed(path, { n_dims, n_points, mixing }) {
 
 /**
  * Segments and points of a path of positions over arc length, centered, at size 1; written as number i of the shapes.
- * @param {Float32Array|Float64Array} recorded rows of all columns
- * @param {import("./rotation.js").Rule} rule
- * @param {Shapes} into
- * @param {number} i
- * @param {boolean} signal whether it is one, over time: tangents are slopes, and nothing turns
+ * Of a signal over time tangents are slopes, and nothing turns.
  */
 export function fillShapes(recorded, rule, into, i, signal) {
   const { n_segments: K, n_points: P, d } = into;
@@ -202,10 +164,7 @@ export function roomFor(m, how) {
   };
 }
 
-/**
- * Write movement number i of its feature rows, and of positions in detail if there are shapes of these.
- * @param {Stored} into
- */
+/** Write movement number i of its feature rows, and of positions in detail if there are shapes of these. */
 export function describeRows(into, i, rows, details, how) {
   rows.forEach((row, r) => {
     setRow(into.rows[r], i * row.length, row, how.rule);
@@ -258,28 +217,19 @@ function angle(vectors, p, q, d) {
   return Math.acos(Math.min(Math.max(cosine, -1), 1)) / Math.PI;
 }
 
-/**
- * A movement as it is compared: its smooth path, rows with their squared norms, and shapes.
- * @param {import("./preparation.js").Movement} movement
- * @param {Object} how
- * @param {Object} arrays
- */
+/** A movement as it is compared: its smooth path, rows with their squared norms, and shapes. */
 export function describeMovement(movement, how, arrays) {
   const unpaused = withoutPauses(movement, how.pauses);
   const smooth = (cutoff) => evenPath(unpaused, cutoff, N_POINTS);
   return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 
-/**
- * A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less.
- * @param {Object} how
- * @param {(cutoff: number|null) => Float64Array} smooth
- */
+/** A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less. */
 export function smoothly(how, smooth) {
   return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff) };
 }
 
-/** The same of a path, smoothed both ways, relative to a first position. @returns {Stored} */
+/** The same of a path, smoothed both ways, relative to a first position. */
 export function describePath({ path, details: detailed }, start, how, arrays) {
   const d = how.n_dims;
   const place = (own) => (how.translation ? own : own.map((x, j) => x + start[Math.floor(j / N_POINTS)]));

@@ -7,30 +7,9 @@ const FAR = 1e300;
 const NO_TURN = Float64Array.of(1);
 
 /**
- * @typedef {Object} PairRule how segments and points are compared
- * @property {number} n_segments
- * @property {number} band
- * @property {number} n_points
- * @property {number} position_weight
- * @property {number} turning_weight of segments
- * @property {number} cloud_turning_weight of points
- * @property {number} line_weight
- *
- * @callback WritePairDistances writes three squares
- * @param {import("./description.js").Shapes} others
- * @param {number} j of one of them
- * @param {Float64Array|null} R the rotation that brings each of its points onto the one movement; null for none
- * @param {Float64Array} squares
- * @returns {void}
- */
-
-/**
  * Elastic, turning and point-cloud distances of one movement to others; see kineme.kernels.pair_distances and
- * point_cloud.
- * @param {PairRule} how
- * @param {import("./description.js").Shapes} own of the one movement
- * @param {number[]} measures of which some are wanted: 0 and 1, elastic and turning, together
- * @returns {WritePairDistances}
+ * point_cloud. Some of the measures may be wanted: 0 and 1, elastic and turning, are computed together.
+ * @param {PairRule} how @param {Shapes} own @returns {WritePairDistances}
  */
 export function pairDistances(how, own, measures = [0, 1, 2]) {
   const { n_segments: K, n_points: P, band } = how;
@@ -194,13 +173,7 @@ function matched({ products, N, own, other }, P, { rows, columns, nearest, lines
 
 const N_MEASURES = 3; // elastic, turning, cloud; the same in detail have the next numbers
 
-/**
- * Squared distances of a described movement to m stored ones: R rows of m numbers.
- * @param {Object} how the header's comparison
- * @param {import("./description.js").Stored} described
- * @param {import("./description.js").Stored} stored
- * @returns {Float64Array}
- */
+/** Squared distances of a described movement to m stored ones: R rows of m numbers. */
 export function squaredDistances(how, described, stored) {
   const { rule, by_rows: blocks, by_pairs: measures } = how;
   const m = stored.m;

@@ -13,13 +13,8 @@ const WHOLE = [1];
 
 /** Progress and time left on average over a class's hypotheses, the remaining path from its best one. */
 function forecast(stored, evidence, label, begun, duration) {
-  const {
-    early,
-    first,
-    n_movements: m,
-    comparison: { n_dims: d },
-  } = stored.recognizer.header;
-  const [G, { paths, prefixes, S }] = [early.n_progress, stored];
+  const { early, first, n_movements: m, comparison } = stored.recognizer.header;
+  const [G, d, { paths, prefixes, S }] = [early.n_progress, comparison.n_dims, stored];
   const from = first[label] * G;
   const own = evidence.subarray(from, (first[label + 1] ?? m) * G);
   const weights = softmax(own);
@@ -65,11 +60,7 @@ function decision(confidence, patience) {
   };
 }
 
-/**
- * Follows one movement; see `kineme.Recognizer.stream`.
- * @param {ReturnType<typeof import("./hypotheses.js").hypotheses>} stored
- * @param {{confidence?: number, patience?: number}} [options]
- */
+/** Follow one movement, given the hypotheses; see `kineme.Recognizer.stream`. */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   const { classes, comparison: how, early } = stored.recognizer.header;
   const { n_dims: d, cutoff, pauses } = how;
@@ -78,15 +69,13 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   /**
    * The state after all samples so far, in the form of `kineme.recognition.LiveState.to_dict`; null while there are too
    * few, or nothing moves.
-   * @param {number[]} times
-   * @param {number[][]} positions
    */
   return (times, positions) => {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
     const soFar = movement(times, positions, d);
     const active = withoutPauses(soFar, early.pauses);
-    const duration = active.times[active.times.length - 1] - active.times[0];
+    const duration = active.times.at(-1) - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
     const unpaused = withoutPauses(soFar, pauses);
     const whole = smoothly(how, (cycles) => smooth(unpaused, cycles));
@@ -120,7 +109,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
 
 /** A movement at even times, as the stored ones are smoothed; its start stays where the spline has it. */
 function smooth({ times, positions, d }, cutoff) {
-  const even = linspace(times[0], times[times.length - 1], N_POINTS);
+  const even = linspace(times[0], times.at(-1), N_POINTS);
   const column = (k) => Float64Array.from(times, (_, j) => positions[j * d + k] - positions[k]);
   const rows = Array.from({ length: d }, (_, k) => interpolate(even, times, column(k)));
   if (cutoff === null) return Float64Array.from(rows.flatMap((row) => [...row]));

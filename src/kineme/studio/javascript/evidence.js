@@ -7,44 +7,23 @@ import { pairDistances, squaredDistances } from "./distances.js";
 import { kernelLogs, logAverages } from "./recognition.js";
 import { align, rotates } from "./rotation.js";
 
-/**
- * @typedef {Object} Numbers those of kineme.recognition.early, in the header
- * @property {number} compared hypotheses compared pair by pair, and the best one of each class
- * @property {number} widened widths of positions where they choose those
- * @property {number} rotation weight of the rotation prior
- * @property {number} speed_spread of the logarithm of the speed at the end
- * @property {number} progress exponent of the density of progress
- * @property {number} power of the similarity of whole movements
- * @property {number} negligible without its exp(-negligible) of the largest evidence a movement is not compared whole
- * @property {number} prior_odds logarithm of the odds that a movement is over before its speed is known
- * @property {number} most_odds
- * @property {number} log_unknown logarithm of the evidence for an unknown movement
- * @property {number} temper exponent of the shares
- * @property {number} explaining a movement explains a beginning at about one in so many values of progress
- */
-
 /** Logarithms of the densities of size, duration, timing, speed at the end, and progress, for each hypothesis. */
 function logPriors(stored, begun, duration) {
   const { prefixes, progress, S, logLengths, logDurations, timingSquares } = stored;
-  const {
-    size_spread: sizeSpread,
-    duration_spread: durationSpread,
-    timing_spread: timingSpread,
-    numbers,
-  } = stored.recognizer.header.early;
+  const { size_spread, duration_spread, timing_spread, numbers } = stored.recognizer.header.early;
   const [length, longer] = [begun.lengths[0], duration].map(finiteLog);
   const square = product(begun.timing, 0, begun.timing, 0, S);
   const over = (value, spread) => (spread === null ? 0 : 0.5 * (value / spread) ** 2);
   return logLengths.map((_, h) => {
     const late = Math.max(square + timingSquares[h] - 2 * product(begun.timing, 0, prefixes.timing, h * S, S), 0);
-    const normal = over(length - logLengths[h], sizeSpread) + over(longer - logDurations[h], durationSpread);
+    const normal = over(length - logLengths[h], size_spread) + over(longer - logDurations[h], duration_spread);
     const faster = (begun.endSpeeds[0] - prefixes.endSpeeds[h]) / numbers.speed_spread;
-    const cauchy = (1 + over(Math.sqrt(late), timingSpread)) * (1 + 0.5 * faster * faster);
+    const cauchy = (1 + over(Math.sqrt(late), timing_spread)) * (1 + 0.5 * faster * faster);
     return numbers.progress * Math.log(progress[h % progress.length]) - normal - Math.log(cauchy);
   });
 }
 
-/** Hypotheses to be compared pair by pair: the best ones, and the best of each class. @returns {number[]} */
+/** Hypotheses to be compared pair by pair: the best ones, and the best of each class. */
 function choose(rough, first, G, compared) {
   const n = rough.length;
   if (n <= compared) return Array.from(rough, (_, h) => h);

@@ -5,18 +5,6 @@ import { fillShapes, N_POINTS, roomForShapes, setRow } from "./description.js";
 import { arcLengthPhase } from "./preparation.js";
 
 /**
- * @typedef {Object} Prefixes G beginnings of each of n movements, S samples along their arc lengths
- * @property {Float32Array} rows centered, of norm 1
- * @property {Float64Array} squares of their norms
- * @property {Float64Array} timing time of each sample as a share of the beginning's, over the root of S
- * @property {Float64Array} sizes
- * @property {Float64Array} lengths
- * @property {Float64Array} elapsed as a share of the movement's time
- * @property {Float64Array} endSpeeds logarithms
- * @property {import("./description.js").Shapes} shapes
- */
-
-/**
  * The beginnings of paths (n, d, N_POINTS) until each share of their arc length, of signals of their time;
  * `numbers.last` is the share of a beginning's time in which the speed at its end is measured.
  * @returns {Prefixes}
@@ -75,10 +63,7 @@ function describeBeginning(prefixes, at, own, times, d, S, rule, signals) {
   fillShapes(sized, rule, prefixes.shapes, at, signals);
 }
 
-/**
- * Every stored movement at every progress; made once.
- * @param {import("./recognition.js").Recognizer} recognizer
- */
+/** Every stored movement at every progress; made once. */
 export function hypotheses(recognizer) {
   const { header, arrays } = recognizer;
   const { early, comparison, n_movements: m } = header;

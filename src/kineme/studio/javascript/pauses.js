@@ -1,29 +1,7 @@
 // Pauses within a movement, cut short: stamps far apart, and rests. The same as kineme.movements.preparation.pauses,
 // whose numbers come with the snapshot.
 
-/**
- * @typedef {Object} PauseRule
- * @property {number} gap median steps, and as many times neighbors and what the length of a step takes: longer ones are
- *   gaps
- * @property {number} pause of the time in motion: a gap, by neighbors and length, or a rest counts at most as much
- * @property {number} rest of the reach: a rest after the start counts as at most the time that this takes at the mean
- *   speed
- * @property {number} last_rest of the time in motion: a rest at the end counts at most as much
- * @property {number} radius of the reach from the first sample: so near to where a window begins a rest stays
- * @property {number} shortest samples of a window, at least
- * @property {number} windows in a movement
- * @property {number} fewest steps that a rest is left, at least
- * @property {number} rounds
- * @property {number} equal ratio of times that is rounding
- * @property {number} same_count difference of counts that is rounding
- */
-
-/**
- * The movement without its pauses; the same object if it has none.
- * @param {import("./preparation.js").Movement} movement
- * @param {PauseRule} rule
- * @returns {import("./preparation.js").Movement}
- */
+/** The movement without its pauses; the same object if it has none. @param {PauseRule} rule */
 export function withoutPauses(movement, rule) {
   let cut = movement;
   for (let round = 0; round < rule.rounds; round++) {

@@ -7,25 +7,9 @@ const TIME_SHARE = 1e-3; // of the arc-length phase, which keeps it rising throu
 const MIN_SAMPLES = 4;
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
-/**
- * @typedef {Object} Movement
- * @property {Float64Array} times [s], rising
- * @property {Float64Array} positions T samples of d numbers, one after the other
- * @property {number} d
- */
-
-/**
- * A movement, checked.
- * @param {ArrayLike<number>} times
- * @param {ArrayLike<ArrayLike<number>>|ArrayLike<number>} positions T samples of d numbers
- * @param {number} d
- * @returns {Movement}
- */
+/** A movement, checked: positions are T samples of d numbers, or all of these in a row. @returns {TimedPositions} */
 export function movement(times, positions, d) {
-  /** @type {(number|number[])[]} */
-  const rows = Array.from(/** @type {ArrayLike<number|ArrayLike<number>>} */ (positions), (row) =>
-    typeof row === "number" ? row : Array.from(row),
-  );
+  const rows = Array.from(positions, (row) => (typeof row === "number" ? row : [...row]));
   const flat = Float64Array.from(rows.flat());
   const t = Float64Array.from(times);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
@@ -41,13 +25,13 @@ export function movement(times, positions, d) {
   return { times: t, positions: flat, d };
 }
 
-/** One dimension minus its first number. @param {Movement} movement @param {number} k */
+/** One dimension minus its first number. */
 function column(movement, k) {
   const { positions, d } = movement;
   return Float64Array.from(movement.times, (_, j) => positions[j * d + k] - positions[k]);
 }
 
-/** Stamps of which consecutive ones are at least `CLOSEST` of the mean step apart. @param {Float64Array} times */
+/** Stamps of which consecutive ones are at least `CLOSEST` of the mean step apart. */
 function spread(times) {
   const last = times.length - 1;
   const least = (CLOSEST * (times[last] - times[0])) / last;
@@ -62,10 +46,7 @@ function spread(times) {
 /**
  * The smoothing spline at n even times, minus the first recorded position: d rows of n numbers.
  * It minimizes `sum_j (x_j - g(u_j))^2 + lam * integral g''(u)^2 du` (Reinsch 1967), with the lam of `cutoff` cycles.
- * @param {Movement} movement
- * @param {number|null} cutoff none: an interpolating spline
- * @param {number} n
- * @returns {Float64Array}
+ * Without a cutoff it is an interpolating spline.
  */
 export function evenPath(movement, cutoff, n) {
   if (cutoff === null) return splinePath(movement, n);
@@ -128,12 +109,7 @@ function evaluate(v, x, m, n) {
   return samples;
 }
 
-/**
- * The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers.
- * @param {Movement} movement
- * @param {number} n
- * @returns {Float64Array}
- */
+/** The not-a-knot cubic spline at n even times, minus the first position: d rows of n numbers. */
 export function splinePath(movement, n) {
   const apart = separated(movement);
   const v = apart.times.map((t) => t - apart.times[0]);
@@ -169,10 +145,7 @@ function bends(v, x) {
   return m;
 }
 
-/**
- * The movement with each group of close samples replaced by its mean; usually there is none.
- * @param {Movement} movement
- */
+/** The movement with each group of close samples replaced by its mean; usually there is none. */
 function separated(movement) {
   const { times, positions, d } = movement;
   const T = times.length;
@@ -217,13 +190,7 @@ function joined(times, gaps, step) {
   return merged;
 }
 
-/**
- * Arc-length phase of an even path, from 0 to 1, blended with time.
- * @param {ArrayLike<number>} path d rows of n numbers
- * @param {number} d
- * @param {number} [share] of the arc length
- * @returns {Float64Array}
- */
+/** A phase of an even path, d rows of numbers, from 0 to 1: a share of it is that of arc length, the rest time. */
 export function arcLengthPhase(path, d, share = 1) {
   const n = path.length / d;
   const phase = new Float64Array(n);

@@ -26,41 +26,7 @@ const SHARES = {
   min: (logs) => logs.map((log) => (log === Math.min(...logs) ? 1 : 0)),
 };
 
-/**
- * @typedef {Object} Recognizer what classes are told apart by
- * @property {Object} header
- * @property {Object} arrays
- * @property {import("./description.js").Stored} stored
- *
- * @typedef {Object} Calibration in the header, beside other numbers
- * @property {number} least smallest distance that counts, in kernel widths
- * @property {number} rounding of a log similarity: no distance
- * @property {number} reach_of_strangers of the typical distance between classes: how far people differ at the most
- * @property {number} reach_to_next of the distance to the next class
- * @property {number} dimensions in which members of a class vary, about; even
- * @property {number} mean_length of normal vectors in these
- * @property {string[]} guesses rules that promise nothing
- * @property {Object<string, string>} promises of each rule, in a sentence
- *
- * @typedef {Object} Answer in the form of `kineme.recognition.Answer.to_dict`
- * @property {string|null} label null: unknown
- * @property {"sure"|"probably"|"looks like"|"new"} certainty
- * @property {number} confidence
- * @property {number} p_known
- * @property {string} rule class, pooled, strangers or guess
- * @property {string} promise
- * @property {boolean} calibrated
- * @property {{label: string, probability: number|null, p_value: number|null}[]} ranked best first
- * @property {{index: number, name: string|null, similarity: number}[]} nearest by their ids where they have some
- * @property {Object|null} transform null: the runtime computes none
- * @property {Object<string, number>} responsibilities
- */
-
-/**
- * The stored movements, described by their smooth paths.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @returns {Recognizer}
- */
+/** The stored movements, described by their smooth paths. @returns {Recognizer} */
 export function knownClasses({ header, arrays }) {
   const how = header.comparison;
   const [d, m] = [how.n_dims, header.n_movements];
@@ -76,11 +42,7 @@ export function knownClasses({ header, arrays }) {
   return { header, arrays, stored };
 }
 
-/**
- * Logarithms of each representation's kernel times R times its weight: R rows of m numbers.
- * @param {Object} how
- * @param {Float64Array} squares
- */
+/** Logarithms of each representation's kernel times R times its weight: R rows of m numbers. */
 export function kernelLogs(how, squares) {
   const { widths, weights } = how;
   const m = squares.length / widths.length;
@@ -92,7 +54,7 @@ export function kernelLogs(how, squares) {
   });
 }
 
-/** The averages of R logarithms, for each of m movements. @returns {Float64Array} */
+/** The averages of R logarithms, for each of m movements. */
 export function logAverages(how, logs) {
   const R = how.widths.length;
   const m = logs.length / R;
@@ -112,11 +74,7 @@ function largest(values, first) {
   });
 }
 
-/**
- * How a movement compares with every class.
- * @param {Recognizer} recognizer
- * @param {Object} described
- */
+/** How a movement compares with every class. */
 export function compare(recognizer, described) {
   const { comparison: how, first, classifier, medoids } = recognizer.header;
   const logs = kernelLogs(how, squaredDistances(how, described, recognizer.stored));
@@ -140,7 +98,7 @@ const distance = (log, { rounding }) => (log < -rounding ? Math.sqrt(-2 * log) :
 /** Share of distances above a score, broad: normal vectors in the plane. */
 const broadLaw = (score) => Math.exp(-0.25 * Math.PI * score * score);
 
-/** The same of normal vectors in more dimensions, an even number. @param {number} score @param {Calibration} numbers */
+/** The same of normal vectors in more dimensions, an even number. */
 function law(score, { dimensions, mean_length: mean }) {
   const y = 0.5 * (mean * score) ** 2;
   let [sum, term] = [0, 1];
@@ -183,10 +141,8 @@ function byStrangers(recognizer, away) {
 }
 
 /**
- * P-values of each class and of all together, see kineme.recognition.conformal.
- * @param {Recognizer} recognizer
- * @param {Float64Array} nearest log similarity to the nearest movement of each class
- * @param {number} errorRate
+ * P-values of each class and of all together, see kineme.recognition.conformal, by the log similarity to the nearest
+ * movement of each class.
  */
 function pValues(recognizer, nearest, errorRate) {
   const { calibration } = recognizer.header;
@@ -218,11 +174,8 @@ function probabilities(recognizer, similar) {
 }
 
 /**
- * The answer to a movement.
- * @param {Recognizer} recognizer
- * @param {import("./preparation.js").Movement} movement
- * @param {number} [errorRate] share of known movements that may be called unknown
- * @returns {Answer}
+ * The answer to a movement; the error rate is the share of known movements that may be called unknown.
+ * @param {Recognizer} recognizer @param {TimedPositions} movement @returns {Answer}
  */
 export function recognize(recognizer, movement, errorRate = 0.05) {
   const { calibration, comparison: how, classes, first } = recognizer.header;

@@ -37,17 +37,6 @@ function isotropic(now, learned, extents) {
   return now.map(() => ratio);
 }
 
-/**
- * @typedef {Object} Primitive
- * @property {ArrayLike<number>} weights d rows of N, times the scale of the formulation
- * @property {number[]} start
- * @property {number[]} goal
- * @property {number[]} velocity per second
- * @property {number} duration [s]
- * @property {number[]} extents
- * @property {string} formulation
- */
-
 /** Elements of exp(A h) with A = [[0, 1], [-K, -D]], row by row. */
 function transition(K, D, h) {
   const a = 0.5 * D;
@@ -112,10 +101,7 @@ function withAcceleration({ n_basis: N, K, D }, state, values) {
 
 /**
  * The decode matrix of a formulation at n even times: x - x0 as a map of (W, g - x0, v0), with v0 = dx/du.
- * @param {Object} how the header's movements
- * @param {string} formulation
- * @param {number} n
- * @returns {Float64Array[]} states at each time, x, x' and x''
+ * States at each time are x, x' and x''.
  */
 function decoder(how, formulation, n) {
   const { n_basis: N } = how;
@@ -142,14 +128,8 @@ function cachedDecoder(how, formulation, n) {
   return decoders.get(key);
 }
 
-/**
- * The primitive of class c, in the formulation of the library or in another one.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @param {number} c
- * @param {string} [formulation]
- * @returns {Primitive}
- */
-export function primitiveOf({ header, arrays }, c, formulation) {
+/** The primitive of class c, in the formulation of the library or in another one. @returns {Primitive} */
+export function primitiveOf({ header, arrays }, c, formulation = header.movements.formulation) {
   const how = header.movements;
   const d = how.n_dims;
   const part = (name, size) => arrays[name].subarray(c * size, (c + 1) * size);
@@ -158,7 +138,7 @@ export function primitiveOf({ header, arrays }, c, formulation) {
   const weights = Float64Array.from(part("weights", d * how.n_basis));
   const duration = arrays["primitive durations"][c];
   const own = { weights, start, goal, velocity, duration, extents, formulation: how.formulation };
-  return formulation === undefined ? own : inFormulation({ header, arrays }, own, formulation);
+  return inFormulation({ header, arrays }, own, formulation);
 }
 
 /** The same path in another formulation: what its goal adds is another, and the weights make up for it. */
@@ -168,7 +148,7 @@ export function inFormulation({ header, arrays }, primitive, formulation) {
   if (!how.encodes) throw new Error(`expected ${primitive.formulation}, in which these primitives were fitted`);
   const [old, now] = [primitive.formulation, formulation].map((name) => cachedDecoder(how, name, how.n_points));
   const apart = old.map((state, t) => state[how.n_basis] - now[t][how.n_basis]);
-  const [more, faster] = fitted(arrays, how, apart);
+  const { weights: more, velocity: faster } = fitted(arrays, how, apart);
   const weights = Float64Array.from(primitive.weights, (weight, i) => {
     const k = Math.floor(i / how.n_basis);
     return weight + (primitive.goal[k] - primitive.start[k]) * more[i % how.n_basis];
@@ -179,21 +159,13 @@ export function inFormulation({ header, arrays }, primitive, formulation) {
   return { ...primitive, weights, velocity, formulation };
 }
 
-/**
- * Weights and initial velocity that fit a path y of n_points, in which no goal pulls.
- * @returns {[Float64Array, number]}
- */
+/** Weights and initial velocity that fit a path y of n_points, in which no goal pulls. */
 function fitted(arrays, { n_basis: N, n_points: n }, y) {
   const weights = Float64Array.from({ length: N }, (_, i) => product(arrays.encoder, i * n, y, 0, n));
-  return [weights, product(arrays["encoder velocity"], 0, y, 0, n)];
+  return { weights, velocity: product(arrays["encoder velocity"], 0, y, 0, n) };
 }
 
-/**
- * Learn a movement; see `kineme.DMP.learn`.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @param {import("./preparation.js").Movement} movement
- * @returns {Primitive}
- */
+/** Learn a movement; see `kineme.DMP.learn`. @param {Snapshot} snapshot @param {TimedPositions} movement */
 export function encode({ header, arrays }, movement) {
   const how = header.movements;
   if (!how.encodes) throw new Error("expected a library whose primitives are fitted to the path as it was recorded");
@@ -203,16 +175,13 @@ export function encode({ header, arrays }, movement) {
   const pull = cachedDecoder(how, how.formulation, n).map((state) => state[how.n_basis]);
   const at = (t) => Array.from({ length: d }, (_, k) => positions[t * d + k]);
   const [start, goal] = [at(0), at(times.length - 1)];
-  const duration = times[times.length - 1] - times[0];
+  const duration = times.at(-1) - times[0];
   const weights = new Float64Array(d * how.n_basis);
   const velocity = start.map((_, k) => {
-    const [own, v0] = fitted(
-      arrays,
-      how,
-      pull.map((gain, t) => rows[k * n + t] - gain * rows[k * n + n - 1]),
-    );
-    weights.set(own, k * how.n_basis);
-    return v0 / duration;
+    const free = pull.map((gain, t) => rows[k * n + t] - gain * rows[k * n + n - 1]);
+    const own = fitted(arrays, how, free);
+    weights.set(own.weights, k * how.n_basis);
+    return own.velocity / duration;
   });
   const extents = start.map((first, k) => {
     let [low, high] = [first, first];
@@ -224,21 +193,8 @@ export function encode({ header, arrays }, movement) {
 }
 
 /**
- * @typedef {Object} Wish with an end velocity the goal is met exactly, as with via points
- * @property {number[]} [start]
- * @property {number[]} [goal]
- * @property {number} [duration]
- * @property {[number, number[]][]} [via]
- * @property {number[]} [endVelocity]
- * @property {number} [samples]
- */
-
-/**
  * The movement to a new start and goal; see `kineme.dmp.Primitives.rollout`.
- * @param {import("./arrays.js").Snapshot} snapshot
- * @param {Primitive} primitive
- * @param {Wish} [wish]
- * @returns {{times: Float64Array, positions: number[][], velocities: number[][], accelerations: number[][]}}
+ * @param {Snapshot} snapshot @param {Primitive} primitive @param {Wish} wish
  */
 export function rollout({ header, arrays }, primitive, wish = {}) {
   const how = header.movements;

@@ -11,29 +11,14 @@ const STRAIGHT = 1e-4; // second singular value as a share of the first: a movem
 const STRAIGHT_TIE = 1e-3;
 const LEAST_TIE = 1e-9;
 
-/**
- * @typedef {Object} Rule how movements are rotated
- * @property {number} n_dims of each point
- * @property {number} n_points J, which turn together
- * @property {number[][]|null} mixing weights of the points, or columns, that are compared pair by pair; null for all
- * @property {number} max_angle
- * @property {number[]|null} prior F of the matrix Fisher density, row by row; null for none
- */
-
-/** Whether there is a rotation at all. @param {Rule} rule */
+/** Whether there is a rotation at all. @param {RotationRule} rule */
 export const rotates = ({ n_dims: d, max_angle }) => max_angle > 0 && (d === 2 || d === 3);
 
 /**
- * The largest inner product of row a with the rotated row b, less what the rotation costs, and that rotation.
- * @param {Rule} rule
- * @param {Float32Array} a of n numbers for each dimension, from i on; see `setRow`
- * @param {number} i
- * @param {Float32Array} b from j on
- * @param {number} j
- * @param {number} n
- * @param {number} norms |a| |b|
- * @param {Float64Array|null} R (d, d), written if given
- * @returns {number}
+ * The largest inner product of row a with the rotated row b, less what the rotation costs, and that rotation R (d, d),
+ * which is written if given. The rows, see `setRow`, have n numbers for each dimension, from i and j on;
+ * norms are |a| |b|.
+ * @param {RotationRule} rule
  */
 export function align(rule, a, i, b, j, n, norms, R) {
   const d = rule.n_dims;
@@ -79,11 +64,7 @@ function inSpace(rule, a, i, b, j, n, norms, R) {
 const M = new Float64Array(9);
 const A = new Float64Array(9);
 
-/**
- * Largest tr(R' G) over rotations R, and that rotation: the largest root of a quartic (Theobald 2005, Markley 1993).
- * @param {Float64Array} G (3, 3)
- * @param {Float64Array|null} R
- */
+/** Largest tr(R' G) over rotations R, and that rotation: the largest root of a quartic (Theobald 2005). */
 function largestTrace(G, R) {
   let size = 0;
   for (let k = 0; k < 9; k++) size += G[k] * G[k];
@@ -141,13 +122,7 @@ function rotate(R, top, square, determinant) {
   }
 }
 
-/**
- * The rotation that brings b closest to a, whatever it costs; of several equally good ones the smallest.
- * @param {Rule} rule
- * @param {Float32Array} a d rows of n numbers
- * @param {Float32Array} b
- * @returns {Float64Array} (d, d)
- */
+/** The rotation (d, d) that brings b closest to a, whatever it costs; of several equally good ones the smallest. */
 export function bestRotation(rule, a, b) {
   const d = rule.n_dims;
   const R = new Float64Array(d * d);

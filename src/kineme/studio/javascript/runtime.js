@@ -7,10 +7,7 @@ import { movement } from "./preparation.js";
 import { knownClasses, recognize } from "./recognition.js";
 import { encode, FORMULATIONS, inFormulation, primitiveOf, rollout } from "./rollout.js";
 
-/**
- * A library that recognizes and moves.
- * @param {string|Object} text a snapshot, see kineme.studio.snapshot
- */
+/** A library that recognizes and moves. The text is a snapshot, see kineme.studio.snapshot. */
 export function open(text) {
   const snapshot = unpack(text);
   const { header } = snapshot;
@@ -19,7 +16,6 @@ export function open(text) {
   let begun = null;
   const all = () => (recognizer ??= knownClasses(snapshot));
   const beginnings = () => (begun ??= hypotheses(all()));
-  const learn = (times, positions) => encode(snapshot, movement(times, positions, d));
   return {
     header,
     classes: header.classes,
@@ -31,7 +27,7 @@ export function open(text) {
     /** A function that is given all samples so far, again and again, and says what they begin to be. */
     follow: (options) => follow(beginnings(), options),
     /** Learn a movement. */
-    encode: learn,
+    encode: (times, positions) => encode(snapshot, movement(times, positions, d)),
     /** The primitive of a class by its name, or one that was learned, in another formulation if one is named. */
     primitive: (what, formulation) =>
       typeof what === "string"

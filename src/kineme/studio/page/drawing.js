@@ -11,7 +11,7 @@ const FEWEST = 4; // samples of a movement
 const SHOWN = 24; // drawings, the last ones
 const picture = new Picture(byId("stage"));
 
-/** @type {import("../web/parts/stroke.js").Hearer} */
+/** @type {Hearer} */
 const hearer = {
   begins: () => {
     picture.ink = [];

@@ -1,8 +1,8 @@
 // The page: draw, see live what it is, drag start and goal.
 
 import { AnswerPanel } from "../web/parts/answer_panel.js";
-import { drag } from "../web/parts/dragging.js";
-import { byId, make, write } from "../web/parts/elements.js";
+import { ARROWS, drag } from "../web/parts/dragging.js";
+import { byId, fill, handOver, make, write } from "../web/parts/elements.js";
 import { followPointer } from "../web/parts/stroke.js";
 import { createMoving, placed } from "./movements.js";
 import { openSnapshot } from "./snapshot.js";
@@ -109,10 +109,8 @@ function tellMoved() {
 function movable(name, what, place) {
   try {
     const moving = createMoving(backend, name, what, place);
-    return {
-      moving,
-      note: moving.update({ formulation: byId("formulation").value || header.movements.formulation }) ?? "",
-    };
+    const formulation = byId("formulation").value || header.movements.formulation;
+    return { moving, note: moving.update({ formulation }) ?? "" };
   } catch (error) {
     return { moving: null, note: error.message };
   }
@@ -146,7 +144,7 @@ const placeOf = (event) => {
   return [event.clientX - left, event.clientY - top];
 };
 
-/** What moves is another; the note says why it cannot be so. @param {string} [note] */
+/** What moves is another; the note says why it cannot be so. */
 function moved(note = "") {
   stage.board.draw();
   if (!state.held) tellMoved();
@@ -163,7 +161,7 @@ function startDragging() {
   canvas.focus({ preventScroll: true });
 }
 
-/** Take hold of a point of what moves. @param {PointerEvent} event */
+/** Take hold of a point of what moves. */
 function hold(event) {
   if (state.held || state.stroke || !state.drags) return;
   state.played = null;
@@ -179,7 +177,7 @@ function hold(event) {
   if (held && drag(canvas, event, (now) => state.moving && go(now), end)) state.held = held;
 }
 
-/** @type {import("../web/parts/stroke.js").Hearer} */
+/** @type {Hearer} */
 const hearer = {
   begins: () => {
     if (state.held || !header.early) return false;
@@ -201,8 +199,6 @@ const hearer = {
   ends: () => state.stroke && finish(),
 };
 
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-
 function key(event) {
   if (event.key === "Escape") become({});
   else if (event.key === " ") play();
@@ -222,34 +218,29 @@ function play() {
   const { moving } = state;
   if (!moving) return;
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const began = performance.now();
   const duration = moving.times.at(-1);
-  const step = (now) => {
-    if (state.moving !== moving || state.held || state.stroke) return;
-    // A frame may be older than its wish.
-    const share = still ? 1 : Math.min(Math.max(now - began, 0) / 1000 / duration, 1);
+  stage.board.run((time) => {
+    if (state.moving !== moving || state.held || state.stroke) return false;
+    const share = still ? 1 : Math.min(time / duration, 1);
     state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
     stage.board.draw();
-    if (share < 1) requestAnimationFrame(step);
-  };
-  requestAnimationFrame(step);
+    return share < 1;
+  });
 }
 
 function save() {
   const { moving } = state;
   const head = ["t [s]", ..."xyz".slice(0, d)].join(",");
   const rows = moving.positions.map((x, i) => [moving.times[i], ...x].map((value) => value.toPrecision(9)).join(","));
-  const url = URL.createObjectURL(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }));
-  make("a", { href: url, download: "movement.csv" }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
+  handOver(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }), "movement.csv");
 }
 
 function start() {
-  for (const name of runtime.formulations) byId("formulation").append(make("option", { value: name }, name));
+  const options = runtime.formulations.map((value) => make("option", { value }, value));
+  fill(byId("formulation"), ...options);
   byId("formulation").value = header.movements.formulation;
   byId("how").hidden = runtime.formulations.length < 2;
-  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".turn")))
-    label.hidden = d === 2;
+  for (const label of document.querySelectorAll(".turn")) label.hidden = d === 2;
   canvas.addEventListener("pointerdown", hold);
   followPointer(canvas, hearer);
   canvas.addEventListener("pointermove", (event) => {
@@ -257,16 +248,16 @@ function start() {
       canvas.classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
   });
   canvas.addEventListener("keydown", key);
-  byId("clear").addEventListener("click", () => become({}));
-  byId("play").addEventListener("click", play);
-  byId("drag").addEventListener("click", startDragging);
-  byId("save").addEventListener("click", save);
-  byId("formulation").addEventListener("change", () => update({ formulation: byId("formulation").value }));
+  byId("clear").onclick = () => become({});
+  byId("play").onclick = play;
+  byId("drag").onclick = startDragging;
+  byId("save").onclick = save;
+  byId("formulation").onchange = () => update({ formulation: byId("formulation").value });
   for (const id of ["turn", "tilt"])
-    byId(id).addEventListener("input", () => {
-      const angles = [Number(byId("turn").value), Number(byId("tilt").value)]; // [degrees]
+    byId(id).oninput = () => {
+      const angles = [byId("turn").valueAsNumber, byId("tilt").valueAsNumber]; // [degrees]
       for (const picture of [stage, symbols]) picture.turn(angles);
-    });
+    };
   become({});
   // Primitives alone recognize nothing; what moves there is where it was before the cell was shown again.
   hearNotebook(({ moved: { name, ...place } }) => {

@@ -1,5 +1,6 @@
 // What moves on the stage: a known movement or one that was drawn, with its start, goal and via points.
 
+import { distance } from "../web/parts/geometry.js";
 import { boxOf } from "./stage.js";
 
 const NEAR = 26; // CSS pixels within which a point is taken hold of
@@ -8,16 +9,7 @@ const ENDS = 0.06; // share of the time next to start and goal where there are n
 const APART = 0.08; // least time between two via points
 const MOST_VIA = 3;
 
-const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
-
-/** @typedef {ReturnType<typeof import("./snapshot.js").openSnapshot>} Snapshot */
-
-/**
- * Start and goal of a symbol where it was learned, moved to the middle of a box.
- * @param {Snapshot} backend
- * @param {string} name
- * @param {import("./stage.js").Box} box
- */
+/** Start and goal of a symbol where it was learned, moved to the middle of a box. @param {OpenedSnapshot} backend */
 export function placed({ runtime, generate }, name, box) {
   const { positions } = generate({ what: { symbol: name } });
   const primitive = runtime.primitive(name);
@@ -28,13 +20,7 @@ export function placed({ runtime, generate }, name, box) {
   return { start: moved(primitive.start), goal: moved(primitive.goal) };
 }
 
-/**
- * A movement that can be changed.
- * @param {Snapshot} backend
- * @param {string} name
- * @param {{symbol?: string, primitive?: Object}} what
- * @param {{start: number[], goal: number[]}} place
- */
+/** A movement that can be changed. @param {OpenedSnapshot} backend */
 export function createMoving({ runtime, generate }, name, what, place) {
   let { start, goal } = place;
   let [via, formulation] = [[], runtime.header.movements.formulation];
@@ -57,15 +43,12 @@ export function createMoving({ runtime, generate }, name, what, place) {
 
   /** What is under a point of the screen: start, goal, a via point, a place on the path; null for nothing. */
   function held(stage, at) {
-    const ends = [
-      ["goal", goal],
-      ["start", start],
-    ].filter(([, x]) => distance(stage.project(x), at) < NEAR);
-    if (ends.length)
-      return { what: ends.sort((a, b) => distance(stage.project(a[1]), at) - distance(stage.project(b[1]), at))[0][0] };
-    const point = via.findIndex(([, x]) => distance(stage.project(x), at) < NEAR);
-    if (point >= 0) return { what: "via", time: via[point][0] };
-    const away = rollout.positions.map((x) => distance(stage.project(x), at));
+    const gap = (x) => distance(stage.project(x), at);
+    const [toStart, toGoal] = [gap(start), gap(goal)];
+    if (Math.min(toStart, toGoal) < NEAR) return { what: toStart < toGoal ? "start" : "goal" };
+    const point = via.find(([, x]) => gap(x) < NEAR);
+    if (point) return { what: "via", time: point[0] };
+    const away = rollout.positions.map(gap);
     const nearest = away.indexOf(Math.min(...away));
     const time = nearest / (away.length - 1);
     const free = time > ENDS && time < 1 - ENDS && via.every(([other]) => Math.abs(other - time) > APART);

@@ -1,7 +1,7 @@
 // A widget of anywidget: a page in a frame of its own, which no style of the notebook reaches.
 
 export default {
-  /** @param {{model: any, el: HTMLElement}} widget @returns {() => void} What ends it. */
+  /** @param {{model: any, el: HTMLElement}} widget @returns What ends it. */
   render({ model, el }) {
     const frame = document.createElement("iframe");
     Object.assign(frame, { title: model.get("_title"), srcdoc: model.get("_page"), height: "400" });
@@ -14,7 +14,7 @@ export default {
       frame.style.cssText = `width: 100%; border: 0; color-scheme: ${dark ? "dark" : "light"}`;
       frame.contentWindow?.postMessage({ dark, drawn: model.get("drawn"), moved: model.get("moved") }, "*");
     };
-    const hear = (/** @type {MessageEvent} */ { source, data }) => {
+    const hear = ({ source, data }) => {
       if (source !== frame.contentWindow) return;
       if (data.height) frame.height = data.height;
       for (const name of ["drawn", "moved"]) if (data[name]) model.set(name, data[name]);

@@ -3,10 +3,7 @@
 import { open } from "../javascript/runtime.js";
 import { explain } from "./explanation.js";
 
-/**
- * @param {string} text of the snapshot
- * @returns {import("../web/parts/server.js").Backend & {runtime: ReturnType<typeof open>}}
- */
+/** @returns {OpenedSnapshot} */
 export function openSnapshot(text) {
   const runtime = open(text);
   const prototype = (name) => runtime.rollout(runtime.primitive(name)).positions;

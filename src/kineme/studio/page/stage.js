@@ -2,17 +2,16 @@
 
 import { Camera } from "../web/parts/camera.js";
 import { Board, color } from "../web/parts/canvas.js";
-import { line, mark } from "../web/parts/lines.js";
+import { bounds } from "../web/parts/geometry.js";
+import { line, mark, words } from "../web/parts/lines.js";
 
 const RADIUS = 9; // of start and goal [CSS pixels]
 const EDGE = 1.5; // half of the line around a dot
 const FILLED = 0.8; // of the shorter side, by a typical movement
 
-/** @typedef {{center: number[], half: number}} Box a place in the middle, and how far is seen from there */
-
 /** A view as the snapshot has it, turned about what is up on the screen, then tilted. */
 class View extends Camera {
-  /** @param {number[]} first rotation matrix, row by row: what is right, up and near on the screen */
+  /** The first view is a rotation matrix, row by row: what is right, up and near on the screen. */
   constructor(first) {
     super();
     this.first = first;
@@ -33,12 +32,7 @@ class View extends Camera {
 }
 
 export class Stage {
-  /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {number[]} first view, see `View`
-   * @param {Box} box what is in view, in the unit of the movements
-   * @param {() => void} paint
-   */
+  /** A box is in view, in the unit of the movements; see `View`. @param {Box} box */
   constructor(canvas, first, box, paint) {
     this.box = box;
     this.camera = new View(first);
@@ -51,13 +45,12 @@ export class Stage {
     this.camera.center(this.box.center, this.box.half, FILLED, this.board.width, this.board.height);
   }
 
-  /** Turn and tilt the view. @param {number[]} angles [degrees] */
+  /** Turn and tilt the view by angles [degrees]. */
   turn(angles) {
     this.camera.angles = angles;
     this.board.draw();
   }
 
-  /** @param {number[]} x @returns {number[]} Pixels. */
   project(x) {
     return this.camera.toScreen(x);
   }
@@ -84,30 +77,18 @@ export class Stage {
   word(text, x, token, path) {
     const { context, width } = this.board;
     const [px, py] = this.project(x);
-    const near = path
-      .map((point) => this.project(point))
-      .filter(([u, v]) => Math.abs(v - py) < 14 && Math.abs(u - px) < 60);
+    const pixels = path.map((point) => this.project(point));
+    const near = pixels.filter(([u, v]) => Math.abs(v - py) < 14 && Math.abs(u - px) < 60);
     const right = near.filter(([u]) => u > px).length;
     const left = px > width - 80 || (px > 80 && right > near.length - right);
-    Object.assign(context, {
-      font: `600 14px ${color("--font")}`,
-      textAlign: left ? "right" : "left",
-      lineWidth: 4,
-      lineJoin: "round",
-      strokeStyle: color("--surface"),
-      fillStyle: color(token),
-    });
-    const at = px + (left ? -1 : 1) * (RADIUS + 7);
-    context.strokeText(text, at, py + 5);
-    context.fillText(text, at, py + 5);
+    Object.assign(context, { font: `600 14px ${color("--font")}`, textAlign: left ? "right" : "left" });
+    words(context, text, px + (left ? -1 : 1) * (RADIUS + 7), py + 5, color(token), color("--surface"));
   }
 }
 
 /** A place in the middle of what points cover, and half of how far they reach. @returns {Box} */
 export function boxOf(points) {
-  const [low, high] = [Math.min, Math.max].map((most) =>
-    points[0].map((_, k) => points.reduce((extreme, x) => most(extreme, x[k]), points[0][k])),
-  );
+  const [low, high] = bounds(points);
   const center = low.map((value, k) => (value + high[k]) / 2);
   return { center, half: Math.max(...high.map((value, k) => value - center[k])) || 1 };
 }

@@ -4,17 +4,12 @@ import { breakable, byId, make } from "../web/parts/elements.js";
 import { matching, startFinding } from "../web/parts/find.js";
 import { boxOf, Stage } from "./stage.js";
 
-/**
- * The list of symbols.
- * @param {{id: string, name: string, path: number[][]}[]} symbols
- * @param {number[]} view of the snapshot
- * @param {(name: string) => void} choose
- */
+/** List the symbols in the view of the snapshot. */
 export function createSymbols(symbols, view, choose) {
   const items = symbols.map(({ name, path }) => {
     const picture = make("canvas", { class: "picture", "aria-hidden": "true" });
-    const button = make("button", { type: "button", title: name }, picture, make("span", {}, ...breakable(name)));
-    button.addEventListener("click", () => choose(name));
+    const act = { type: "button", title: name, onclick: () => choose(name) };
+    const button = make("button", act, picture, make("span", {}, ...breakable(name)));
     const item = make("li", {}, button);
     byId("symbols").append(item);
     const stage = new Stage(picture, view, boxOf(path), () => {
@@ -30,11 +25,11 @@ export function createSymbols(symbols, view, choose) {
   startFinding(byId("find"), find, () => items.find(({ item }) => !item.hidden)?.button ?? null);
   find();
   return {
-    /** Mark the one of that name; none for null. @param {string|null} chosen */
+    /** Mark the one of that name; none for null. */
     select: (chosen) => {
-      for (const { name, button } of items) button.setAttribute("aria-pressed", String(name === chosen));
+      for (const { name, button } of items) button.ariaPressed = String(name === chosen);
     },
-    /** Turn and tilt the pictures. @param {number[]} angles [degrees] */
+    /** Turn and tilt the pictures by angles [degrees]. */
     turn: (angles) => {
       for (const { stage } of items) stage.turn(angles);
     },

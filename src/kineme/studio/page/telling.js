@@ -7,13 +7,13 @@ const rules = /** @type {CSSMediaRule[]} */ ([...document.styleSheets[0].cssRule
 const dark = rules.find(({ media }) => media?.mediaText.includes("color-scheme")).media;
 let drawings = [];
 
-/** @param {Object} state Parts of the widget's. */
+/** Tell parts of the widget's state. */
 export const tell = (state) => inNotebook && parent.postMessage(state, "*");
 
-/** @param {[string|null, number[][]]} drawing A name, and samples. */
+/** Tell a drawing: a name, and samples. */
 export const tellDrawn = (drawing) => tell({ drawn: [...drawings, drawing] });
 
-/** @param {(state: {drawn: any[], moved: any}) => void} hear The widget's. */
+/** Hear the widget's state. */
 export function hearNotebook(hear) {
   if (!inNotebook) return;
   window.addEventListener("message", ({ source, data }) => {

@@ -11,7 +11,7 @@ import { startSaving } from "./parts/saving.js";
 import { startShortcuts } from "./parts/shortcuts.js";
 import { say, tried } from "./parts/toasts.js";
 import { startViews } from "./parts/views.js";
-import { startRecordings } from "./recordings/view.js";
+import { Recordings } from "./recordings/view.js";
 import { startRobot } from "./robot/view.js";
 
 const AWAY = "The server does not answer. What you draw stays here; trying again.";
@@ -19,32 +19,20 @@ const ANEW =
   "The studio was started anew, with another token. Open the address that it printed; " +
   "what you drew here stays until then.";
 
-/** The last part of a folder's path. @param {string} folder */
-const lastPart = (folder) =>
-  folder
-    .replace(/[/\\]+$/, "")
-    .split(/[/\\]/)
-    .pop() || folder;
-
-onLibrary((contents) => {
-  byId("library-name").textContent = lastPart(contents.folder);
-  byId("library-name").title = contents.folder;
-  byId("library-count").textContent =
-    `${counted(contents.symbols.length, "symbol")}, ${counted(contents.n_movements, "movement")}`;
-  byId("library-mode").hidden = !contents.read_only;
-  byId("undo").disabled = !contents.can_undo || contents.read_only;
-  document.body.classList.toggle("read-only", contents.read_only);
-  fill(byId("names"), ...contents.symbols.map((/** @type {any} */ symbol) => make("option", { value: symbol.name })));
+onLibrary(({ folder, symbols, n_movements: n, read_only: isReadOnly, can_undo: canUndo }) => {
+  byId("library-name").textContent = folder.split(/[/\\]/).findLast(Boolean) ?? folder;
+  byId("library-name").title = folder;
+  byId("library-count").textContent = `${counted(symbols.length, "symbol")}, ${counted(n, "movement")}`;
+  byId("library-mode").hidden = !isReadOnly;
+  byId("undo").disabled = !canUndo || isReadOnly;
+  document.body.classList.toggle("read-only", isReadOnly);
+  fill(byId("names"), ...symbols.map(({ name: value }) => make("option", { value })));
 });
 
-/** @param {boolean} here */
 function connected(here) {
   byId("status").dataset.state = here ? "here" : "away";
   byId("away-note").hidden = here;
-  if (!here)
-    get("/api/library").catch(
-      (/** @type {any} */ error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY),
-    );
+  if (!here) get("/api/library").catch((error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY));
 }
 
 const draw = startDraw((message) => live.send(message));
@@ -53,21 +41,21 @@ const live = new Live({
   answer: draw.answer,
   source: draw.source,
   error: (text) => draw.error(text) || say(text, { failed: true }),
-  changed: (version) => version !== library().version && tried(refresh),
+  changed: (version) => version !== library().version && tried(refresh()),
   here: () => {
     connected(true);
     draw.renewed();
-    tried(refresh);
+    tried(refresh());
   },
   away: () => {
     connected(false);
     draw.lost();
   },
 });
-tried(refresh); // without waiting for the websocket
+tried(refresh()); // without waiting for the websocket
 startLibrary();
 startMove();
-startRecordings();
+new Recordings();
 startRobot();
 startMirror();
 startShortcuts();

@@ -22,6 +22,7 @@
       tip: () => view?.tip(),
       at: (end) => view?.at(end),
       frames: () => view?.frames(),
+      picture: () => view?.picture() ?? null,
     },
   }).kineme;
   const view = sceneOrNothing();
@@ -294,6 +295,10 @@
       },
       at: (end) => onScreen(shown.ends[end].position),
       frames: () => frames,
+      picture() {
+        draw(); // what was drawn before is no longer there
+        return renderer.domElement.toDataURL();
+      },
     };
   }
 

@@ -10,21 +10,13 @@ import { clear, FEWEST_SAMPLES, movementOf } from "./session.js";
 const PATIENCE = 1500; // [ms]
 const LATE = "The server takes long. Nothing is lost.";
 
-/** @typedef {import("./session.js").Session} Session */
+/** Samples of a canvas of a height in the units and dimensions of the library. */
+function inLibrary(samples, height) {
+  const z = library().n_dims === 3 ? [0] : [];
+  return samples.map(([time, x, y]) => [time, x * height, y * height, ...z]);
+}
 
-/**
- * Samples of the canvas in the units and dimensions of the library.
- * @param {number[][]} samples
- * @param {number} height Of the canvas, in the units of the library.
- */
-const inLibrary = (samples, height) =>
-  samples.map(([time, ...point]) => [
-    time,
-    ...point.map((value) => value * height),
-    ...(library().n_dims === 3 ? [0] : []),
-  ]);
-
-/** @param {Session} session @param {string} pointer @returns {boolean} Whether one may draw. */
+/** @param {DrawSession} session @returns Whether one may draw. */
 function begin(session, pointer) {
   const { picture } = session;
   if (!takesDrawings() || picture.turns) return false;
@@ -39,15 +31,15 @@ function begin(session, pointer) {
   return true;
 }
 
-/** @param {Session} session @param {number[][]} samples */
+/** @param {DrawSession} session */
 function extend(session, samples) {
   session.picture.ink.push(...samples);
-  mirror(samples[samples.length - 1]);
+  mirror(samples.at(-1));
   session.picture.board.draw();
   if (library().symbols.length) session.sending.push(inLibrary(samples, session.height));
 }
 
-/** @param {Session} session */
+/** @param {DrawSession} session */
 function end(session) {
   const { picture, panel } = session;
   session.drawing = false;
@@ -63,11 +55,7 @@ function end(session) {
   if (!session.sending.finish()) requestAnswer(session);
 }
 
-/**
- * What hears the pointer and the pen of the keyboard.
- * @param {Session} session
- * @returns {import("../parts/stroke.js").Hearer}
- */
+/** What hears the pointer and the pen of the keyboard. @param {DrawSession} session @returns {Hearer} */
 export const hearerOf = (session) => ({
   begins: (pointer) => begin(session, pointer),
   // Escape ends a drawing while the pen is down.

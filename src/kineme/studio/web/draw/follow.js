@@ -8,13 +8,9 @@ import { usualSide } from "./scale.js";
 import { clear, FEWEST_SAMPLES, keyOf, movementOf } from "./session.js";
 import { Sources } from "./sources.js";
 
-/**
- * @typedef {import("./session.js").Session} Session
- * @typedef {import("./sources.js").Source} Source
- */
-
-/** @param {Session} session @returns {Sources} */
+/** @param {DrawSession} session */
 export function startFollowing(session) {
+  /** @type {Sources} */
   const sources = new Sources(
     (source) => follow(session, source),
     () => release(session, sources),
@@ -23,13 +19,13 @@ export function startFollowing(session) {
 }
 
 /** Whether a program's movement may take the canvas: nothing is lost that was drawn or is being named. */
-function isFree(/** @type {Session} */ session, /** @type {Source} */ source) {
+function isFree(session, source) {
   if (session.drawing || session.pending || byId("naming-name").value.trim()) return false;
   const shown = session.source;
   return shown ? shown.id === source.id || shown.ended !== null : session.movement === null;
 }
 
-/** @param {Session} session @param {Source} source */
+/** @param {DrawSession} session @param {Source} source */
 function follow(session, source) {
   const key = keyOf(source);
   if (key === session.dismissed || !source.samples.length) return;
@@ -46,7 +42,7 @@ function follow(session, source) {
   else if (ended === null) end(session, source.ended);
 }
 
-/** @param {Session} session */
+/** @param {DrawSession} session */
 function begin(session) {
   clear(session);
   session.pointer = "program";
@@ -55,26 +51,26 @@ function begin(session) {
   showLegend(true);
 }
 
-/** @param {Session} session @param {number} painted How many samples are on the canvas already. */
+/** @param {DrawSession} session */
 function paint({ picture, source: { samples, state, ended } }, painted) {
   const width = samples[0].length - 1;
   const path = ended === null ? (state?.path ?? []) : [];
   picture.ink = samples.map(([time, ...point]) => [time - samples[0][0], ...point]);
-  picture.rest = path.filter((/** @type {number[]} */ point) => point.length === width);
+  picture.rest = path.filter((point) => point.length === width);
   const added = samples.slice(Math.min(painted, samples.length - 1)).map(([, ...point]) => point);
   picture.frame.include([...added, ...picture.rest], picture.board);
   picture.board.draw();
   byId("draw-clear").disabled = false;
 }
 
-/** @param {Session} session */
+/** @param {DrawSession} session */
 function showProgress({ panel, source: { samples, state } }) {
   if (!state) return;
-  panel.drawing(state, samples[samples.length - 1][0]);
+  panel.drawing(state, samples.at(-1)[0]);
   if (state.skipped && !state.ranked.length) panel.words("Cannot be compared", "?", state.status[0] ?? "", "unknown");
 }
 
-/** The program said that its movement is over, or has gone. @param {Session} session @param {any} ending */
+/** The program said that its movement is over, or has gone. @param {DrawSession} session */
 function end(session, ending) {
   const { samples } = session.source;
   byId("draw-replay").disabled = false;
@@ -84,11 +80,7 @@ function end(session, ending) {
   showAnswer(session, ending.answer);
 }
 
-/**
- * A program is gone or ignored: a movement that it has not ended is asked for.
- * @param {Session} session
- * @param {Sources} sources
- */
+/** A program is gone or ignored: a movement that it has not ended is asked for. @param {DrawSession} session */
 function release(session, sources) {
   const { source } = session;
   if (!source || source.ended !== null) return;

@@ -4,14 +4,12 @@ import { Camera } from "../parts/camera.js";
 const WIDER = 0.25; // of the size, on the side on which it leaves
 
 export class Frame {
-  /** @param {number} size Of a usual movement. @param {number[][][]} paths Like which it may be. */
+  /** The size is that of a usual movement; it may be like one of the paths. */
   constructor(size, paths) {
     this.camera = new Camera();
     this.camera.face(paths);
     this.size = size;
-    /** @type {number[]} */
     this.low = [];
-    /** @type {number[]} */
     this.high = [];
   }
 
@@ -20,13 +18,12 @@ export class Frame {
     return !this.camera.flat;
   }
 
-  /** @param {number[][]} points That are to be seen. @param {import("../parts/canvas.js").Board} board */
+  /** Let points be seen. */
   include(points, board) {
     for (const point of points) this.grow(point.slice(0, 3));
     if (this.low.length) this.camera.fit([this.low, this.high], board.width, board.height);
   }
 
-  /** @param {number[]} point */
   grow(point) {
     if (!this.low.length) {
       this.low = point.map((value) => value - this.size / 2);

@@ -1,15 +1,12 @@
 // A gamepad as a pen: its sticks move it, a held button draws.
+import { clamp } from "../parts/geometry.js";
 import { currentView } from "../parts/views.js";
 
 const SPEED = 1.2; // heights of the canvas a second
 const DEAD = 0.15; // of a stick's way, within which it rests
 const SOURCE = { id: -1, name: "gamepad (hold a button to draw)", movement: 0, samples: [], state: null, ended: null };
 
-/**
- * @param {HTMLCanvasElement} canvas
- * @param {import("../parts/stroke.js").Hearer} hear
- * @param {import("./sources.js").Sources} sources Has it while it is connected.
- */
+/** The sources have it while it is connected. @param {Hearer} hear @param {Sources} sources */
 export function followGamepad(canvas, hear, sources) {
   let at = [0.5, 0.5];
   let before = 0;
@@ -17,7 +14,7 @@ export function followGamepad(canvas, hear, sources) {
   let held = false;
   let down = false;
 
-  const step = (/** @type {number} */ now) => {
+  const step = (now) => {
     const pad = navigator.getGamepads().find(Boolean);
     const on = pad && !sources.ignored.has(SOURCE.name) && currentView() === "draw";
     const presses = Boolean(on && pad.buttons.slice(0, 8).some((button) => button.pressed));
@@ -35,7 +32,7 @@ export function followGamepad(canvas, hear, sources) {
     if (on && length > DEAD) {
       const size = [canvas.clientWidth / canvas.clientHeight, 1];
       const to = at.map((value, k) => value + (SPEED * passed * way[k]) / Math.max(length, 1));
-      at = to.map((value, k) => Math.min(Math.max(value, 0), size[k]));
+      at = to.map((value, k) => clamp(value, 0, size[k]));
       since ||= now - 1000 * passed;
       if (down) hear.goes([[(now - since) / 1000, ...at]]);
     }

@@ -1,4 +1,5 @@
 // A hand that a camera sees: its index finger draws while the thumb touches it.
+import { distance } from "../parts/geometry.js";
 import { currentView } from "../parts/views.js";
 
 const INDEX = 8; // the tip of the index finger, among the 21 landmarks of a hand
@@ -7,13 +8,7 @@ const PALM = [0, 9]; // its ends
 const [CLOSED, OPEN] = [0.3, 0.45]; // distance from thumb to index finger, in lengths of the palm
 const PATIENCE = 500; // without landmarks, after which the hand has gone [ms]
 
-/** @typedef {{points: number[][], time: number, aspect: number}} Landmarks As /api/live takes them; y points down. */
-
-/**
- * @param {import("./picture.js").Picture} picture
- * @param {import("../parts/stroke.js").Hearer} hear
- * @returns What takes the landmarks of one moment.
- */
+/** @param {Hearer} hear @returns What takes the landmarks of one moment. */
 export function handPen(picture, hear) {
   const { board } = picture;
   let down = false;
@@ -29,12 +24,12 @@ export function handPen(picture, hear) {
     picture.hand = null;
     board.draw();
   };
-  return (/** @type {Landmarks} */ { points, time, aspect }) => {
+  return ({ points, time, aspect }) => {
     clearTimeout(timer);
     if (currentView() !== "draw") return leave();
     const middle = board.width / board.height / 2;
     const hand = points.map(([x, y]) => [middle + (x - 0.5) * aspect, 1 - y]);
-    const [pinched, palm] = [PINCH, PALM].map(([a, b]) => Math.hypot(hand[a][0] - hand[b][0], hand[a][1] - hand[b][1]));
+    const [pinched, palm] = [PINCH, PALM].map(([a, b]) => distance(hand[a], hand[b]));
     const pinch = pinched / palm;
     if (pinch > OPEN) lift();
     if (pinch < CLOSED && !down) {

@@ -10,12 +10,11 @@ const SAME_HEIGHT = 1e-9; // of points of a plane movement
 export function takesDrawings() {
   const { n_dims: dims, symbols } = library();
   if (dims === null || dims === 2) return true;
-  const isPlane = (/** @type {number[][]} */ path) =>
-    path.every((point) => Math.abs(point[2] - path[0][2]) < SAME_HEIGHT);
+  const isPlane = (path) => path.every((point) => Math.abs(point[2] - path[0][2]) < SAME_HEIGHT);
   return dims === 3 && symbols.every((symbol) => !symbol.path || isPlane(symbol.path));
 }
 
-/** @param {boolean} filled Whether there is a movement on the canvas. */
+/** Show the invitation, or the canvas that a movement has filled. */
 export function showInvitation(filled) {
   const [{ symbols }, takes] = [library(), takesDrawings()];
   showLegend(filled);
@@ -29,10 +28,9 @@ export function showInvitation(filled) {
   fill(byId("known-symbols"), ...symbols.slice(0, SHOWN).map(picture));
 }
 
-/** @param {any} symbol */
 const picture = ({ name, path }) => make("li", {}, thumbnail(path), make("span", { title: name }, ...breakable(name)));
 
-/** @param {boolean} filled Whether there is a movement: the invitation goes, and what its colors mean is said. */
+/** Where a movement has filled the canvas the invitation goes, and what its colors mean is said. */
 export function showLegend(filled) {
   const { symbols } = library();
   byId("draw-empty").hidden = filled;

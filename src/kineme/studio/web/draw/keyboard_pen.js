@@ -1,10 +1,11 @@
 // A pen for the keyboard: space puts it down and lifts it, arrow keys steer it.
+import { ARROWS } from "../parts/dragging.js";
+import { clamp } from "../parts/geometry.js";
 
 const SPEED = 0.6; // heights of the canvas a second
 const SMOOTH = 0.18; // share of the way to the wanted velocity, each frame
-const STEERS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-/** @param {HTMLCanvasElement} canvas @param {any} hear As of followPointer, and `pen` for where it is. */
+/** @param {Hearer} hear */
 export function followKeys(canvas, hear) {
   const held = new Set();
   let at = [0, 0];
@@ -14,20 +15,17 @@ export function followKeys(canvas, hear) {
   let down = false;
 
   const wanted = () => {
-    const sum = [...held].reduce(([x, y], key) => [x + STEERS[key][0], y + STEERS[key][1]], [0, 0]);
+    const sum = [...held].reduce(([x, y], key) => [x + ARROWS[key][0], y - ARROWS[key][1]], [0, 0]);
     const length = Math.hypot(...sum) || 1;
     return sum.map((value) => (SPEED * value) / length);
   };
-  const step = (/** @type {number} */ now) => {
+  const step = (now) => {
     if (!down) return;
     const passed = Math.min((now - before) / 1000, 0.05);
     before = now;
     velocity = velocity.map((value, k) => value + SMOOTH * (wanted()[k] - value));
-    const wide = canvas.clientWidth / canvas.clientHeight;
-    at = [
-      Math.min(Math.max(at[0] + passed * velocity[0], 0), wide),
-      Math.min(Math.max(at[1] + passed * velocity[1], 0), 1),
-    ];
+    const size = [canvas.clientWidth / canvas.clientHeight, 1];
+    at = at.map((value, k) => clamp(value + passed * velocity[k], 0, size[k]));
     const moved = Math.hypot(...velocity) > 0.002;
     if (moved && !since) since = now - 1000 * passed;
     if (moved) hear.goes([[(now - since) / 1000, ...at]]);
@@ -51,7 +49,7 @@ export function followKeys(canvas, hear) {
 
   canvas.addEventListener("keydown", (event) => {
     if (event.key === " ") down ? lift() : put();
-    else if (event.key in STEERS) held.add(event.key);
+    else if (event.key in ARROWS) held.add(event.key);
     else return;
     event.preventDefault();
   });

@@ -6,7 +6,7 @@ import { canvasHeight } from "./scale.js";
 
 const PATH = "/api/wand";
 
-/** @param {Promise<any>} answer Address, picture and fingerprint; none where the studio does not listen for a phone. */
+/** The address is none where the studio does not listen for a phone. */
 async function showAddress(answer) {
   const { address, picture, fingerprint, error } = await answer.catch((error) => ({ error }));
   write(byId("phone-problem"), error?.message ?? "");
@@ -21,15 +21,15 @@ async function showAddress(answer) {
 
 export function offerPhone() {
   const dialog = byId("phone");
-  byId("draw-phone").addEventListener("click", () => {
+  byId("draw-phone").onclick = () => {
     dialog.showModal();
     showAddress(get(PATH));
-  });
-  byId("phone-close").addEventListener("click", () => dialog.close());
-  byId("phone-form").addEventListener("submit", (event) => {
+  };
+  byId("phone-close").onclick = () => dialog.close();
+  byId("phone-form").onsubmit = (event) => {
     event.preventDefault();
     if (byId("phone-ask").hidden) return showAddress(remove(PATH));
     const where = { host: byId("phone-host").value.trim() || null, height: canvasHeight() };
     showAddress(post(PATH, { ...where, n_dims: library().n_dims === 3 ? 3 : 2 }));
-  });
+  };
 }

@@ -8,61 +8,35 @@ import { Picture } from "./picture.js";
 
 export const FEWEST_SAMPLES = 4; // that make a movement
 
-/**
- * @typedef {import("../parts/server.js").Movement} Movement
- *
- * @typedef {Object} Session
- * @property {Picture} picture
- * @property {AnswerPanel} panel
- * @property {import("../parts/sending.js").Sending} sending
- * @property {import("./naming.js").Naming|null} naming
- * @property {boolean} drawing The pen is down.
- * @property {boolean} pending The movement is over, and its answer is still to come.
- * @property {Movement|null} movement That is over: it can be learned.
- * @property {{movement: Movement, name: string|null, members: number}|null} learned From this drawing; so many
- *   had the name then.
- * @property {string} pointer What draws: mouse, pen, touch, keyboard or program.
- * @property {number} height Of the canvas, in the units of the library.
- * @property {string|null} label
- * @property {import("./sources.js").Source|null} source The program whose movement is shown.
- * @property {string} dismissed The movement of a program that is not shown again.
- */
+const NOTHING = { source: null, movement: null, learned: null, label: null, pending: false, drawing: false };
 
-/** @param {(message: Object) => boolean} send @returns {Session} */
+/** @returns {DrawSession} */
 export const createSession = (send) => ({
   picture: new Picture(byId("draw-canvas")),
   panel: new AnswerPanel({ picture: (name) => symbolNamed(name)?.path ?? null }),
   sending: server.follow(send),
   naming: null,
-  drawing: false,
-  pending: false,
-  movement: null,
-  learned: null,
-  pointer: "",
-  height: 1,
-  label: null,
-  source: null,
-  dismissed: "",
+  ...{ pointer: "", height: 1, dismissed: "" },
+  ...NOTHING,
 });
 
-/** A key of the movement that a program sends. @param {import("./sources.js").Source} source */
+/** A key of the movement that a program sends. */
 export const keyOf = (source) => `${source.id} ${source.movement}`;
 
-/** Samples, each a time and coordinates, as a movement. @param {number[][]} samples @returns {Movement} */
+/** Samples, each a time and coordinates, as a movement. @returns {Movement} */
 export const movementOf = (samples) => ({
   times: samples.map(([time]) => time),
   positions: samples.map(([, ...point]) => point),
 });
 
-/** Empty the canvas; the movement of a program that was on it does not come back. @param {Session} session */
+/** Empty the canvas; the movement of a program that was on it does not come back. @param {DrawSession} session */
 export function clear(session) {
   const { picture } = session;
   if (session.source) session.dismissed = keyOf(session.source);
   byId("sources").classList.remove("waits");
   Object.assign(picture, { ink: [], rest: [], height: null, replayed: null, frame: null });
   picture.board.draw();
-  Object.assign(session, { source: null, movement: null, learned: null, label: null });
-  Object.assign(session, { pending: false, drawing: false });
+  Object.assign(session, NOTHING);
   session.panel.idle();
   session.naming.allow(false);
   session.naming.empty();

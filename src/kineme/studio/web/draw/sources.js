@@ -1,27 +1,20 @@
 // Programs that send movements: what each has sent so far, a line for each, and whether one is ignored.
-import { byId, fill, keepingFocus, make } from "../parts/elements.js";
+import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 
 const MOST = 10000; // samples that are held of a movement, the last ones
 
-/**
- * @typedef {{id: number, name: string, movement: number, samples: number[][], state: any, ended: any, hand?: any}}
- *   Source
- */
-
 export class Sources {
-  /** @param {(source: Source) => void} changed @param {() => void} fewer A program is gone or ignored. */
+  /** There are fewer where a program is gone or ignored. */
   constructor(changed, fewer) {
     this.changed = changed;
     this.fewer = fewer;
-    /** @type {((hand: import("./hand.js").Landmarks) => void)|null} Takes what a camera sees. */
-    this.hand = null;
+    this.hand = null; // takes what a camera sees
     /** @type {Map<number, Source>} */
     this.connected = new Map();
-    /** @type {Set<string>} Names: a program that comes back stays ignored. */
-    this.ignored = new Set();
+    this.ignored = new Set(); // names: a program that comes back stays ignored
   }
 
-  /** @param {Source & {gone?: boolean}} news Of one source, by the server. */
+  /** Hear news of a source. @param {Source} news */
   hear(news) {
     if (news.gone) return this.forget(news.id);
     const before = this.connected.get(news.id);
@@ -37,7 +30,6 @@ export class Sources {
     if (news.hand && news.hand.time !== before?.hand?.time) this.hand(news.hand);
   }
 
-  /** @param {number} id */
   forget(id) {
     this.connected.delete(id);
     this.list();
@@ -64,25 +56,17 @@ export class Sources {
 
   /** @param {Source} source */
   line(source) {
-    const off = this.ignored.has(source.name);
-    const button = make(
-      "button",
-      {
-        class: "button quiet",
-        type: "button",
-        "aria-pressed": String(off),
-        "data-key": `source ${source.id}`,
-        "aria-label": `Ignore ${source.name}`,
-        on: { click: () => this.ignore(source) },
-      },
-      off ? "Ignored" : "Ignore",
-    );
+    const { id, name } = source;
+    const off = this.ignored.has(name);
     return make(
       "li",
-      { class: off ? "off" : "" },
+      off ? "off" : "",
       make("span", { class: "source-dot", "aria-hidden": "true" }),
-      make("span", { class: "source-name" }, `Live source connected: ${source.name}`),
-      button,
+      make("span", "source-name", `Live source connected: ${name}`),
+      button(off ? "Ignored" : "Ignore", () => this.ignore(source), {
+        ...{ class: "button quiet", "aria-pressed": String(off) },
+        ...{ "data-key": `source ${id}`, "aria-label": `Ignore ${name}` },
+      }),
     );
   }
 }

@@ -17,9 +17,7 @@ import { startNaming } from "./naming.js";
 import { offerPhone } from "./phone.js";
 import { clear, createSession } from "./session.js";
 
-/** @typedef {import("./session.js").Session} Session */
-
-/** @param {Session} session @param {string|null} name Under which the movement was learned. */
+/** @param {DrawSession} session */
 function showLearned(session, name) {
   const learned = { movement: session.movement, name, members: membersOf(name) };
   Object.assign(session, { label: name, movement: null, learned });
@@ -32,27 +30,28 @@ function showLearned(session, name) {
   byId("draw-canvas").scrollIntoView({ block: "nearest" }); // where it is drawn again
 }
 
-/** Go to Move, with the symbol that was recognized. @param {Session} session */
+/** Go to Move, with the symbol that was recognized. @param {DrawSession} session */
 function move({ label }) {
   const symbol = label === null ? null : symbolNamed(label);
   if (symbol) chooseToMove(symbol.id);
   show("move", true);
 }
 
-/** @param {Session} session */
-function listen(session) {
+/** Start the view. @returns What hears the server. */
+export function startDraw(send) {
+  const session = createSession(send);
+  const sources = startFollowing(session);
+  session.naming = startNaming({
+    movement: () => session.movement,
+    learned: (name) => showLearned(session, name),
+  });
   const { picture } = session;
   const canvas = byId("draw-canvas");
-  followPointer(canvas, hearerOf(session));
-  followKeys(canvas, hearerOf(session));
-  followTurns(
-    canvas,
-    () => picture.turns,
-    (dx, dy) => picture.turn(dx, dy),
-  );
-  byId("draw-clear").addEventListener("click", () => clear(session));
-  byId("draw-replay").addEventListener("click", () => picture.replay());
-  byId("draw-move").addEventListener("click", () => move(session));
+  for (const follow of [followPointer, followKeys]) follow(canvas, hearerOf(session));
+  followTurns(canvas, picture);
+  byId("draw-clear").onclick = () => clear(session);
+  byId("draw-replay").onclick = () => picture.replay();
+  byId("draw-move").onclick = () => move(session);
   document.addEventListener("keydown", (event) => {
     const isOurs = event.key === "Escape" && currentView() === "draw";
     if (isOurs && !document.querySelector("dialog[open]")) clear(session);
@@ -61,32 +60,21 @@ function listen(session) {
     showInvitation(picture.ink.length > 0);
     reopen(session);
   });
-  for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-example]")))
-    button.addEventListener("click", async () => {
+  for (const button of document.querySelectorAll("[data-example]"))
+    button.onclick = async () => {
       const { example } = button.dataset;
       if ((await learnExample(example)) && example === "arm") show("robot", true);
-    });
-}
-
-/** @param {(message: Object) => boolean} send @returns What hears the server. */
-export function startDraw(send) {
-  const session = createSession(send);
-  const sources = startFollowing(session);
-  session.naming = startNaming({
-    movement: () => session.movement,
-    learned: (name) => showLearned(session, name),
-  });
-  listen(session);
+    };
   for (const host of document.querySelectorAll("[data-host]")) host.textContent = location.host;
-  followGamepad(byId("draw-canvas"), hearerOf(session), sources);
+  followGamepad(canvas, hearerOf(session), sources);
   offerPhone();
-  sources.hand = handPen(session.picture, hearerOf(session));
+  sources.hand = handPen(picture, hearerOf(session));
   window.addEventListener("kineme-hand", (event) => sources.hand(/** @type {CustomEvent} */ (event).detail));
   return {
-    state: (/** @type {any} */ state) => showState(session, state),
-    answer: (/** @type {any} */ answer) => hearAnswer(session, answer),
-    error: (/** @type {string} */ text) => showError(session, text),
-    source: (/** @type {any} */ message) => sources.hear(message),
+    state: (state) => showState(session, state),
+    answer: (answer) => hearAnswer(session, answer),
+    error: (text) => showError(session, text),
+    source: (message) => sources.hear(message),
     lost: () => session.sending.lost(),
     renewed: () => {
       session.sending.renewed();

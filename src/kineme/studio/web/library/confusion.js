@@ -12,21 +12,20 @@ export async function showConfusion() {
   version = library().version;
   byId("confusion-text").textContent = "Each movement is recognized by the others …";
   fill(byId("confusion-table"));
-  const answer = await tried(() => get("/api/confusion"));
-  byId("confusion-text").textContent = answer
-    ? `${answer.in_words}. Rows: names; columns: what they are taken for.`
-    : "";
+  const answer = await tried(get("/api/confusion"));
+  const words = answer && `${answer.in_words}. Rows: names; columns: what they are taken for.`;
+  byId("confusion-text").textContent = words ?? "";
   if (!answer) return;
   const { names, counts } = answer;
-  const head = names.map((/** @type {string} */ name) => make("th", { scope: "col" }, make("span", {}, name)));
-  const rows = names.map((/** @type {string} */ name, /** @type {number} */ i) => {
-    const sum = counts[i].reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0);
-    const cells = counts[i].map((/** @type {number} */ n, /** @type {number} */ j) => {
-      const cell = make("td", { class: i === j ? "right" : "wrong" }, n ? String(n) : "");
+  const head = names.map((name) => make("th", { scope: "col" }, make("span", {}, name)));
+  const rows = names.map((name, i) => {
+    const sum = counts[i].reduce((a, b) => a + b, 0);
+    const cells = counts[i].map((n, j) => {
+      const cell = make("td", i === j ? "right" : "wrong", n || "");
       cell.style.setProperty("--share", String(n / sum));
       return cell;
     });
     return make("tr", {}, make("th", { scope: "row" }, name), ...cells);
   });
-  fill(byId("confusion-table"), make("tr", {}, make("td", {}), ...head), ...rows);
+  fill(byId("confusion-table"), make("tr", {}, make("td"), ...head), ...rows);
 }

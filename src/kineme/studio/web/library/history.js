@@ -6,34 +6,28 @@ import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 import { library } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 
-/** @param {any} entry A version. @param {number} seen */
-async function again(entry, seen) {
-  const text =
-    `${entry.said}. The library will be as it was then. Nothing is lost: later versions stay in the history, ` +
-    "and this can be undone.";
-  if (await ask({ title: `Restore version ${entry.number}?`, text, yes: "Restore" })) await restore(entry.number, seen);
-}
+const KEPT = "Nothing is lost: later versions stay in the history, and this can be undone.";
 
-/** @param {any} entry */
-const of = ({ number }) => ({
-  ...{ class: "button quiet", "data-key": `restore ${number}`, "aria-label": `Restore version ${number}` },
-});
-
-/** @param {any} entry @param {number} seen */
-const row = (entry, seen) =>
-  make(
+function row({ number, said, time, can_restore }, seen) {
+  const again = async () => {
+    const text = `${said}. The library will be as it was then. ${KEPT}`;
+    if (await ask({ title: `Restore version ${number}?`, text, yes: "Restore" })) await restore(number, seen);
+  };
+  const look = { class: "button quiet", "data-key": `restore ${number}`, "aria-label": `Restore version ${number}` };
+  return make(
     "li",
     {},
-    make("span", { class: "numbers soft" }, `${entry.number}`),
-    make("span", { class: "said" }, entry.said),
-    make("time", { class: "soft small" }, String(entry.time).replace("T", " ").slice(0, 19)),
-    entry.can_restore ? button("Restore", () => again(entry, seen), of(entry)) : null,
+    make("span", "numbers soft", number),
+    make("span", "said", said),
+    make("time", "soft small", time.replace("T", " ").slice(0, 19)),
+    can_restore ? button("Restore", again, look) : null,
   );
+}
 
 export async function showHistory() {
   if (!byId("history").open) return;
   const { version } = library();
-  const answer = await tried(() => get("/api/library/history"));
+  const answer = await tried(get("/api/library/history"));
   if (!answer || version !== library().version) return;
-  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((/** @type {any} */ entry) => row(entry, version))));
+  keepingFocus(() => fill(byId("versions"), ...answer.versions.map((entry) => row(entry, version))));
 }

@@ -2,8 +2,9 @@
 import { get } from "../parts/api.js";
 import { Board, color } from "../parts/canvas.js";
 import { byId } from "../parts/elements.js";
+import { bounds, clamp, distance } from "../parts/geometry.js";
 import { library, lookOf, symbolOf } from "../parts/library_state.js";
-import { mark } from "../parts/lines.js";
+import { mark, words } from "../parts/lines.js";
 import { tried } from "../parts/toasts.js";
 
 const EDGE = 34; // [px]
@@ -11,25 +12,26 @@ const NEAR = 18; // how close a pointer must be [px]
 const MANY = 40; // symbols, whose names would cover the dots
 
 export class MovementMap {
-  /** @param {(symbol: string) => void} open "" for a movement without one. */
+  /** `open` opens a symbol, or "" for a movement without one. */
   constructor(open) {
     this.open = open;
     this.points = [];
     this.at = -1;
     this.board = new Board(byId("map"), () => this.paint());
-    const canvas = byId("map");
-    canvas.addEventListener("pointermove", (event) => this.point(event));
-    canvas.addEventListener("pointerleave", () => this.show(-1));
-    canvas.addEventListener("click", (event) => {
-      this.point(event);
-      this.choose();
+    Object.assign(byId("map"), {
+      onpointermove: (event) => this.point(event),
+      onpointerleave: () => this.show(-1),
+      onclick: (event) => {
+        this.point(event);
+        this.choose();
+      },
+      onkeydown: (event) => this.key(event),
     });
-    canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
   async load() {
     const { version } = library();
-    const answer = await tried(() => get("/api/library/map"));
+    const answer = await tried(get("/api/library/map"));
     if (!answer || version !== library().version) return;
     this.points = [...answer.points].sort((a, b) => a.x - b.x);
     this.at = -1;
@@ -38,14 +40,11 @@ export class MovementMap {
     this.board.draw();
   }
 
-  /** @returns {number[][]} Pixels of all points. */
+  /** Pixels of all points. */
   pixels() {
+    if (!this.points.length) return [];
     const { width, height } = this.board;
-    const range = (/** @type {"x"|"y"} */ axis) => [
-      Math.min(...this.points.map((p) => p[axis])),
-      Math.max(...this.points.map((p) => p[axis])),
-    ];
-    const [[left, right], [low, high]] = [range("x"), range("y")];
+    const [[left, low], [right, high]] = bounds(this.points.map(({ x, y }) => [x, y]));
     const scale = Math.min((width - 2 * EDGE) / (right - left || 1), (height - 2 * EDGE) / (high - low || 1));
     return this.points.map(({ x, y }) => [
       width / 2 + scale * (x - (left + right) / 2),
@@ -66,7 +65,7 @@ export class MovementMap {
     this.names(pixels);
   }
 
-  /** As many names as fit; the one under the pointer in any case, and clearly. @param {number[][]} pixels */
+  /** As many names as fit; the one under the pointer in any case, and clearly. */
   names(pixels) {
     const { context } = this.board;
     const places = new Map();
@@ -74,44 +73,31 @@ export class MovementMap {
       if (symbol !== null) places.set(symbol, [...(places.get(symbol) ?? []), pixels[k]]);
     const chosen = this.points[this.at]?.symbol ?? null;
     const taken = places.size > MANY ? pixels.map(([x, y]) => [x - 7, x + 7, y + 4, 12]) : [];
-    Object.assign(context, {
-      font: `600 13px ${color("--font")}`,
-      textAlign: "center",
-      lineWidth: 4,
-      strokeStyle: color("--surface"),
-      fillStyle: color("--text"),
-      lineJoin: "round",
-    });
+    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center" });
     context.globalAlpha = chosen === null ? 1 : 0.3;
     for (const [id, members] of places) if (id !== chosen) this.name(id, members, taken);
     context.globalAlpha = 1;
     if (chosen !== null) this.name(chosen, places.get(chosen), []);
   }
 
-  /**
-   * @param {string} id
-   * @param {number[][]} members Their pixels.
-   * @param {number[][]} taken From where to where, on which line, how far from it; this name is added.
-   */
+  /** Write a name; `taken` is from where to where, on which line, how far from it, and gets this one. */
   name(id, members, taken) {
     const { context } = this.board;
     const name = symbolOf(id)?.name ?? "";
     const short = name.length > 18 ? `${name.slice(0, 17)}…` : name;
     const half = context.measureText(short).width / 2 + 4;
-    const place = this.freePlace(members, half, taken);
-    if (place === null) return;
-    const [x, y] = place;
+    const [x, y] = this.freePlace(members, half, taken);
+    if (x === undefined) return;
     taken.push([x - half, x + half, y, 15]);
-    context.strokeText(short, x, y);
-    context.fillText(short, x, y);
+    words(context, short, x, y, color("--text"), color("--surface"));
   }
 
-  /** Above, below or beside the dots of a name, where nothing else stands; null where there is no room. */
-  freePlace(/** @type {number[][]} */ members, /** @type {number} */ half, /** @type {number[][]} */ taken) {
+  /** Above, below or beside the dots of a name, where nothing else stands; [] where there is no room. */
+  freePlace(members, half, taken) {
     const { width, height } = this.board;
-    const [across, along] = [members.map((pixel) => pixel[0]), members.map((pixel) => pixel[1])];
-    const middle = (/** @type {number[]} */ some) => some.reduce((sum, value) => sum + value, 0) / some.length;
-    const x = Math.min(Math.max(middle(across), half), width - half);
+    const [across, along] = [0, 1].map((axis) => members.map((pixel) => pixel[axis]));
+    const middle = (some) => some.reduce((sum, value) => sum + value, 0) / some.length;
+    const x = clamp(middle(across), half, width - half);
     const places = [
       [x, Math.max(Math.min(...along) - 11, 14)],
       [x, Math.min(Math.max(...along) + 21, height - 6)],
@@ -122,18 +108,17 @@ export class MovementMap {
       taken.every(
         ([left, right, other, room]) => at + half < left || at - half > right || Math.abs(line - other) > room,
       );
-    return places.find(([at, line]) => at >= half && at <= width - half && free([at, line])) ?? null;
+    return places.find(([at, line]) => at >= half && at <= width - half && free([at, line])) ?? [];
   }
 
-  /** @param {MouseEvent} event */
   point(event) {
     const box = this.board.canvas.getBoundingClientRect();
-    const away = this.pixels().map(([x, y]) => Math.hypot(x - event.clientX + box.left, y - event.clientY + box.top));
+    const at = [event.clientX - box.left, event.clientY - box.top];
+    const away = this.pixels().map((pixel) => distance(pixel, at));
     const nearest = away.indexOf(Math.min(...away));
     this.show(away[nearest] < NEAR ? nearest : -1);
   }
 
-  /** @param {number} at */
   show(at) {
     if (at === this.at) return;
     this.at = at;
@@ -148,7 +133,6 @@ export class MovementMap {
     if (this.at >= 0) this.open(this.points[this.at].symbol ?? "");
   }
 
-  /** @param {KeyboardEvent} event */
   key(event) {
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (step && this.points.length) this.show((this.at + step + this.points.length) % this.points.length);

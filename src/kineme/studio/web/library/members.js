@@ -7,27 +7,25 @@ import { tried } from "../parts/toasts.js";
 
 const PAGE = 60;
 
-/** @param {any} movement @param {Set<number>} chosen @param {() => void} changed */
 export function memberButton(movement, chosen, changed) {
-  const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
-  if (library().read_only)
-    return make("div", { class: "member", role: "img", "aria-label": about, title: about }, thumbnail(movement.path));
+  const { id, name, path, duration } = movement;
+  const title = `${name ?? `Movement ${id}`}, ${(duration ?? 0).toFixed(1)} s`;
+  const look = { class: "member", "aria-label": title, title };
+  if (library().read_only) return make("div", { ...look, role: "img" }, thumbnail(path));
   const choose = () => {
-    chosen.has(movement.id) ? chosen.delete(movement.id) : chosen.add(movement.id);
-    member.setAttribute("aria-pressed", String(chosen.has(movement.id)));
+    chosen.delete(id) || chosen.add(id);
+    member.ariaPressed = String(chosen.has(id));
     changed();
   };
-  const member = button("", choose, {
-    ...{ class: "member", "aria-label": about, title: about, "data-key": `movement ${movement.id}` },
-    "aria-pressed": String(chosen.has(movement.id)),
-  });
-  member.append(thumbnail(movement.path));
+  const member = button("", choose, { ...look, "data-key": `movement ${id}` });
+  member.ariaPressed = String(chosen.has(id));
+  member.append(thumbnail(path));
   return member;
 }
 
 /** The members of a symbol, or the movements without one, with a button for more. */
 export class Members {
-  /** @param {string} query As `symbol=ID` or `unlabeled=1`. @param {() => void} changed When others are chosen. */
+  /** The query is `symbol=ID` or `unlabeled=1`. */
   constructor(query, changed) {
     this.query = query;
     this.changed = changed;
@@ -35,7 +33,7 @@ export class Members {
     const label = library().read_only ? "Movements" : "Movements; choose some";
     this.grid = make("div", { class: "members", role: "group", "aria-label": label });
     this.more = button("Show more", () => this.load(), { class: "button quiet", hidden: true });
-    this.element = make("div", { class: "members-part" }, this.grid, this.more);
+    this.element = make("div", "members-part", this.grid, this.more);
     this.shown = 0;
     this.loading = false;
     this.load();
@@ -46,7 +44,7 @@ export class Members {
     if (this.loading) return;
     this.loading = true;
     const part = `offset=${this.shown}&limit=${PAGE}&version=${library().version}`;
-    const answer = await tried(() => get(`/api/library/movements?${this.query}&${part}`));
+    const answer = await tried(get(`/api/library/movements?${this.query}&${part}`));
     this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);

@@ -1,5 +1,5 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
-import { get } from "../parts/api.js";
+import { get, path } from "../parts/api.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { breakable, button, byId, counted, fill, make } from "../parts/elements.js";
@@ -11,42 +11,30 @@ import { show } from "../parts/views.js";
 import { chooseToMove } from "../parts/chosen.js";
 import { Members } from "./members.js";
 
-const UNLABELED = "";
-
-/** @param {string} text @param {() => any} act @param {string} kind */
 const action = (text, act, kind = "") => button(text, act, { class: `button ${kind}`, "data-key": `symbol ${text}` });
 
-/** @param {any} symbol */
 async function rename(symbol) {
   const name = await ask({ title: `Rename ${symbol.name}`, yes: "Rename", name: symbol.name });
   if (name && name !== symbol.name) await changes.rename(symbol.id, name);
 }
 
-/** @param {any} symbol */
 async function forget(symbol) {
   const text = "Its movements stay in the library without a name. This can be undone.";
   if (await ask({ title: `Delete ${symbol.name}?`, text, yes: "Delete", danger: true }))
     await changes.forget(symbol.id, symbol.name);
 }
 
-/** @param {any} symbol */
 function description(symbol) {
   const placeholder = "What it means, for people and planners";
-  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder });
-  field.value = symbol.description ?? "";
-  field.addEventListener("change", () => changes.describe(symbol.id, field.value));
-  return make("label", { class: "field" }, make("span", {}, "Description"), field);
+  const onchange = ({ target }) => changes.describe(symbol.id, target.value);
+  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder, onchange }, symbol.description);
+  return make("label", "field", make("span", {}, "Description"), field);
 }
 
-/**
- * What can be done with chosen movements.
- * @param {any} symbol Or null of those without one.
- * @param {Members} members
- */
+/** What can be done with chosen movements of a symbol, or of none. @param {Members} members */
 function actions(symbol, members) {
   const ids = () => members.ids();
   const some = () => counted(ids().length, "movement");
-  /** @type {(title: string, text: string, yes: string) => Promise<string|null>} */
   const named = (title, text, yes) => ask({ title, text: `${some()} ${text}`, yes, name: "" });
   const give = async () => {
     const text = "chosen. A name that exists is that symbol, another one is a new symbol.";
@@ -73,16 +61,14 @@ function actions(symbol, members) {
  * closes.
  */
 export class SymbolPanel {
-  /** @param {(id: string) => void} closed */
   constructor(closed) {
     this.closed = closed;
+    this.hint = byId("symbol").firstElementChild;
     byId("symbol").addEventListener("keydown", ({ key }) => key === "Escape" && this.close());
-    /** @type {string|null} Id; "" for the movements without a symbol. */
-    this.opened = null;
+    this.opened = null; // id; "" for the movements without a symbol
     this.version = -1;
   }
 
-  /** @param {string|null} id @param {boolean} focus */
   open(id, focus = false) {
     this.opened = id;
     this.version = -1;
@@ -93,14 +79,14 @@ export class SymbolPanel {
 
   close() {
     const id = this.opened ?? "";
-    this.hint(byId("symbol"));
+    this.clear();
     this.closed(id);
   }
 
   show() {
     const panel = byId("symbol");
     const symbol = this.opened ? symbolOf(this.opened) : null;
-    if (!symbol && (this.opened !== UNLABELED || !library().unlabeled)) return this.hint(panel);
+    if (!symbol && (this.opened !== "" || !library().unlabeled)) return this.clear();
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
@@ -110,13 +96,13 @@ export class SymbolPanel {
     const words = make("figcaption", { class: "small", role: "status" });
     const compared = make("figure", { class: "compared", hidden: true }, canvas, words);
     const overlay = new Overlay(canvas);
-    const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", async () => {
+    const members = new Members(symbol ? path`symbol=${symbol.id}` : "unlabeled=1", async () => {
       const ids = members.ids();
       for (const act of acts) act.disabled = !ids.length;
       count.textContent = ids.length ? `${counted(ids.length, "movement")} chosen` : hint;
       compared.hidden = true;
       if (ids.length !== 2) return;
-      const both = await tried(() => get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
+      const both = await tried(get(`/api/compare?first=${ids[0]}&second=${ids[1]}`));
       if (!both || String(members.ids()) !== String(ids)) return; // others are chosen by now
       words.textContent = `${both.in_words}.`;
       compared.hidden = false;
@@ -137,35 +123,30 @@ export class SymbolPanel {
     );
   }
 
-  /** @param {any} symbol */
   head(symbol) {
     const moveIt = () => {
       chooseToMove(symbol.id);
       show("move", true);
     };
     const { read_only: readOnly } = library();
-    const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
-    const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts));
+    const facts = symbol.duration ? `${symbol.duration.toFixed(1)} s` : "";
+    const words = make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", "soft", facts));
     const acts = [
       action("Move it", moveIt, "main"),
       action("Rename", () => rename(symbol)),
       action("Delete symbol", () => forget(symbol), "danger"),
     ];
     return [
-      make("div", { class: "symbol-head" }, thumbnail(symbol.path), words),
-      make("div", { class: "row" }, ...acts.slice(0, readOnly ? 1 : 3)),
+      make("div", "symbol-head", thumbnail(symbol.path), words),
+      make("div", "row", ...acts.slice(0, readOnly ? 1 : 3)),
       readOnly ? symbol.description && make("p", {}, symbol.description) : description(symbol),
     ];
   }
 
-  /** @param {Element} panel */
-  hint(panel) {
+  /** Say what can be done here. */
+  clear() {
     this.opened = null;
-    panel.classList.remove("opened");
-    const text = library().read_only
-      ? "Here its movements are shown."
-      : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. " +
-        "Everything can be undone.";
-    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, text)));
+    byId("symbol").classList.remove("opened");
+    fill(byId("symbol"), this.hint);
   }
 }

@@ -1,10 +1,10 @@
 // Library: symbols, those that are proposed, the map, the history.
 import { merge } from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { byId, counted } from "../parts/elements.js";
+import { byId, counted, keyed } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
-import { library, onLibrary, symbolOf } from "../parts/library_state.js";
-import { currentView, onShow } from "../parts/views.js";
+import { library, symbolOf } from "../parts/library_state.js";
+import { onShow } from "../parts/views.js";
 import { chosen, showCards } from "./cards.js";
 import { showConfusion } from "./confusion.js";
 import { showHistory } from "./history.js";
@@ -17,12 +17,8 @@ let shown = -1; // version
 async function mergeChosen() {
   const ids = [...chosen];
   const names = ids.map((id) => symbolOf(id).name);
-  const into = await ask({
-    title: `Merge ${counted(ids.length, "symbol")}`,
-    text: names.join(", "),
-    yes: "Merge",
-    name: names[0],
-  });
+  const title = `Merge ${counted(ids.length, "symbol")}`;
+  const into = await ask({ title, text: names.join(", "), yes: "Merge", name: names[0] });
   if (!into) return;
   chosen.clear();
   await merge(ids, into);
@@ -31,7 +27,7 @@ async function mergeChosen() {
 export function startLibrary() {
   const panel = new SymbolPanel((id) => {
     marked(null);
-    /** @type {HTMLElement} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus();
+    keyed(`open ${id}`)?.focus();
   });
   const map = new MovementMap((id) => open(id));
   const chose = () => {
@@ -41,17 +37,16 @@ export function startLibrary() {
     byId("merge").disabled = chosen.size < 2 || library().read_only;
   };
   const cards = () => showCards({ open, opened: panel.opened, chose });
-  /** @param {string|null} id The one that is open. */
   function marked(id) {
     for (const card of document.querySelectorAll(".card-open"))
-      card.setAttribute("aria-current", String(/** @type {any} */ (card).dataset.key === `open ${id}`));
+      card.ariaCurrent = String(card.dataset.key === `open ${id}`);
   }
-  function open(/** @type {string} */ id) {
+  function open(id) {
     panel.open(id, true);
     marked(id);
   }
   const all = () => {
-    if (currentView() !== "library" || shown === library().version) return;
+    if (shown === library().version) return;
     shown = library().version;
     const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
@@ -70,10 +65,9 @@ export function startLibrary() {
     showHistory();
   };
   startFinding(byId("find-symbol"), cards, () => document.querySelector(".card-open"));
-  byId("merge").addEventListener("click", mergeChosen);
-  byId("show-unlabeled").addEventListener("click", () => open(""));
-  byId("history").addEventListener("toggle", showHistory);
-  byId("confusion").addEventListener("toggle", showConfusion);
+  byId("merge").onclick = mergeChosen;
+  byId("show-unlabeled").onclick = () => open("");
+  byId("history").ontoggle = showHistory;
+  byId("confusion").ontoggle = showConfusion;
   onShow("library", all);
-  onLibrary(all);
 }

@@ -14,11 +14,7 @@ const OBSTACLE = { time: 0.6, away: 0.08, radius: 0.07 }; // beside the path, in
 const SAME = 0.04; // of the duration: a place of the path so near to a via point takes hold of that one
 const LONGEST = 4; // times the demonstrated duration; the shortest is as many times less
 
-/** @typedef {import("./session.js").Session} Session */
-
-/** @typedef {{changed: () => void, removed: (list: Object[], point: Object) => void}} Page */
-
-/** What hears of points that changed, or went away. @param {Session} session @returns {Page} */
+/** What hears of points that changed, or went away. @param {MoveSession} session @returns {PointsPage} */
 const pageOf = (session) => ({
   changed: () => showChange(session),
   removed: (list, point) => {
@@ -27,13 +23,13 @@ const pageOf = (session) => ({
   },
 });
 
-/** Points came or went. @param {Session} session */
+/** Points came or went. @param {MoveSession} session */
 export function showStructure(session) {
   session.handles.set(handlesOf(session.plan, session.camera, pageOf(session)));
   showChange(session);
 }
 
-/** A point or the duration is another one. @param {Session} session */
+/** A point or the duration is another one. @param {MoveSession} session */
 export function showChange(session) {
   const { plan } = session;
   keepInSight(session);
@@ -45,17 +41,18 @@ export function showChange(session) {
   if (!session.dragging) showNumbers(session);
 }
 
-/** @param {Session} session */
+/** @param {MoveSession} session */
 function showNumbers(session) {
   const { steps } = session;
-  steps.keep(session.plan);
+  const { start, goal, via, obstacles, share } = session.plan;
+  steps.keep({ start, goal, via, obstacles, share });
   byId("move-undo").disabled = !steps.has(-1);
   byId("move-redo").disabled = !steps.has(1);
-  byId("move-reset").disabled = steps.plans.length < 2 && !session.plan.style;
+  byId("move-reset").disabled = steps.states.length < 2 && !session.plan.style;
   showPoints(session.plan, pageOf(session));
 }
 
-/** A point is held, or let go. @param {Session} session @param {boolean} dragging */
+/** A point is held, or let go. @param {MoveSession} session */
 export function showDragging(session, dragging) {
   session.dragging = dragging;
   byId("move-stage").classList.toggle("dragging", dragging);
@@ -64,41 +61,32 @@ export function showDragging(session, dragging) {
   keepInSight(session);
 }
 
-/** Stretch the movement: from a quarter of the demonstrated duration to four times it. @param {Session} session */
+/** Stretch the movement: from a quarter of the demonstrated duration to four times it. @param {MoveSession} session */
 export function stretch(session) {
   if (!session.plan) return;
-  session.plan.share = LONGEST ** (Number(byId("duration").value) / 100);
+  session.plan.share = LONGEST ** (byId("duration").valueAsNumber / 100);
   showChange(session);
 }
 
-/**
- * Go back before the last change of a point or the duration, or forth again.
- * @param {Session} session @param {number} by -1 goes back, 1 forth.
- */
+/** Go back before the last change of a point or the duration, or with 1 forth again. @param {MoveSession} session */
 export function step(session, by) {
   const { plan, steps } = session;
   if (!plan || !steps.has(by)) {
     if (by < 0) say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
     return;
   }
-  steps.go(plan, by);
-  byId("duration").value = String(Math.round((100 * Math.log(plan.share)) / Math.log(LONGEST)));
+  Object.assign(plan, steps.go(by));
+  byId("duration").valueAsNumber = (100 * Math.log(plan.share)) / Math.log(LONGEST);
   showStructure(session);
 }
 
-/**
- * A point of the path that is shown, or of the recording as long as there is none.
- * @param {Session} session @param {number} time Share of the duration. @returns {number[]}
- */
+/** A point of the path that is shown, or of the recording as long as there is none; time is a share of the duration. */
 function pointAt({ picture, plan }, time) {
   const points = picture.paths[0]?.path.positions ?? plan.path;
   return [...points[Math.round(time * (points.length - 1))]];
 }
 
-/**
- * The path itself is taken hold of: where it is grabbed becomes a via point.
- * @param {Session} session @param {import("./plan.js").ViaPoint} place @param {PointerEvent} event
- */
+/** The path itself is taken hold of: where it is grabbed becomes a via point. @param {MoveSession} session */
 export function grabPath(session, place, event) {
   const { plan, handles } = session;
   let k = plan.via.findIndex(({ at }) => Math.abs(at - place.at) < SAME);
@@ -110,7 +98,7 @@ export function grabPath(session, place, event) {
   handles.grab(handles.grips.get(`via ${k}`), event);
 }
 
-/** @param {Session} session */
+/** @param {MoveSession} session */
 export function addVia(session) {
   const { plan, handles } = session;
   if (!plan) return;
@@ -120,7 +108,7 @@ export function addVia(session) {
   handles.focus(`via ${plan.via.length - 1}`);
 }
 
-/** @param {Session} session */
+/** @param {MoveSession} session */
 export function addObstacle(session) {
   const { plan, handles } = session;
   if (!plan) return;

@@ -7,7 +7,6 @@ export const FORMULATIONS = [
   { name: "original", key: "third", look: { color: "--goal", dash: [2, 6] } },
 ];
 
-/** @param {(names: string[]) => void} changed */
 export function startFormulations(changed) {
   const boxes = [...byId("formulations").querySelectorAll("input")];
   const manners = [...byId("manner").querySelectorAll("input")];
@@ -16,16 +15,15 @@ export function startFormulations(changed) {
     for (const manner of manners) manner.checked = names.join() === manner.value;
     changed(names);
   };
-  byId("formulations").addEventListener("change", show);
-  byId("manner").addEventListener("change", () => {
+  byId("formulations").onchange = show;
+  byId("manner").onchange = () => {
     const { value } = manners.find((manner) => manner.checked);
     for (const box of boxes) box.checked = box.value === value;
     show();
-  });
+  };
 }
 
-/** A style moves in its own formulation alone. @param {boolean} on */
+/** A style moves in its own formulation alone. */
 export function allowFormulations(on) {
-  byId("formulations").disabled = !on;
-  byId("manner").disabled = !on;
+  byId("formulations").disabled = byId("manner").disabled = !on;
 }

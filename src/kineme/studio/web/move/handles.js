@@ -1,30 +1,17 @@
 // The points one can take hold of: buttons over the picture, for the hand and for arrow keys.
-import { drag } from "../parts/dragging.js";
+import { ARROWS, drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
-import { distance, extent, pointsOf } from "./plan.js";
+import { distance } from "../parts/geometry.js";
+import { extent, pointsOf } from "./plan.js";
 
 const STEP = 6; // of an arrow key [px]; ten times with Shift
-const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const SMALLEST = 0.01; // radius of an obstacle, in sizes of the movement
 
-/**
- * @typedef {{key: string, kind: string, name: string, remove?: () => void}} Named
- * @typedef {Named & {at: () => number[], move: (point: number[]) => void}} Handle
- * @typedef {{handle: Handle, button: HTMLButtonElement}} Grip
- */
-
-/**
- * The handles of a plan.
- * @param {import("./plan.js").Plan} plan
- * @param {import("../parts/camera.js").Camera} camera
- * @param {import("./edits.js").Page} page
- * @returns {Handle[]}
- */
+/** The handles of a plan. @param {Plan} plan @param {Camera} camera @param {PointsPage} page @returns {Handle[]} */
 export function handlesOf(plan, camera, page) {
   const smallest = SMALLEST * extent(plan.path);
   return pointsOf(plan).flatMap(({ key, kind, name, owner, field, list }) => {
     const remove = list && (() => page.removed(list, owner));
-    /** @type {Handle} */
     const point = {
       ...{ key, kind, name, remove },
       at: () => owner[field],
@@ -34,7 +21,6 @@ export function handlesOf(plan, camera, page) {
       },
     };
     if (kind !== "obstacle") return [point];
-    /** @type {Handle} */
     const rim = {
       ...{ key: `${key} rim`, kind: "rim", name: `Rim of ${name.toLowerCase()}`, remove },
       at: () => camera.moved(owner.center, owner.radius * camera.scale, 0),
@@ -48,10 +34,6 @@ export function handlesOf(plan, camera, page) {
 }
 
 export class Handles {
-  /**
-   * @param {import("../parts/camera.js").Camera} camera
-   * @param {{moving: (on: boolean) => void, text: (value: number) => string}} page
-   */
   constructor(camera, page) {
     this.camera = camera;
     this.page = page;
@@ -78,23 +60,22 @@ export class Handles {
 
   /** @param {Handle} handle @returns {Grip} */
   add(handle) {
+    const { key, kind } = handle;
     const button = make("button", {
-      class: `handle ${handle.kind}`,
-      type: "button",
-      "data-key": `handle ${handle.key}`,
+      ...{ class: `handle ${kind}`, type: "button", "data-key": `handle ${key}` },
+      onpointerdown: (event) => this.grab(grip, event),
+      onkeydown: (event) => this.key(grip, event),
+      ondblclick: () => grip.handle.remove?.(),
     });
     const grip = { handle, button };
-    button.addEventListener("pointerdown", (event) => this.grab(grip, event));
-    button.addEventListener("keydown", (event) => this.key(grip, event));
-    button.addEventListener("dblclick", () => grip.handle.remove?.());
     byId("handles").append(button);
     return grip;
   }
 
-  /** @param {Grip} grip @param {PointerEvent} event */
+  /** @param {Grip} grip */
   grab(grip, event) {
     let [x, y] = [event.clientX, event.clientY];
-    const go = (/** @type {PointerEvent} */ now) => {
+    const go = (now) => {
       grip.handle.move(this.camera.moved(grip.handle.at(), now.clientX - x, now.clientY - y));
       [x, y] = [now.clientX, now.clientY];
     };
@@ -109,18 +90,17 @@ export class Handles {
     this.page.moving(true);
   }
 
-  /** @param {Grip} grip @param {KeyboardEvent} event */
+  /** @param {Grip} grip */
   key({ handle }, event) {
-    if (event.key in KEYS) {
+    if (event.key in ARROWS) {
       const far = STEP * (event.shiftKey ? 10 : 1);
-      const [x, y] = KEYS[event.key];
+      const [x, y] = ARROWS[event.key];
       handle.move(this.camera.moved(handle.at(), far * x, far * y));
     } else if (event.key === "Delete" && handle.remove) handle.remove();
     else return;
     event.preventDefault();
   }
 
-  /** @param {string} key */
   focus(key) {
     this.grips.get(key)?.button.focus({ preventScroll: true });
   }

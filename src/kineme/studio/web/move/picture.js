@@ -1,8 +1,9 @@
 // The stage of Move: paths, obstacles, points in time; in space it turns.
 import { Board, color } from "../parts/canvas.js";
-import { ground, line, mark } from "../parts/lines.js";
-import { byId } from "../parts/elements.js";
 import { followTurns } from "../parts/dragging.js";
+import { byId } from "../parts/elements.js";
+import { bounds, distance } from "../parts/geometry.js";
+import { ground, line, mark } from "../parts/lines.js";
 import { extent, isTouched } from "./plan.js";
 
 const LEGEND_ROOM = 40; // at the lower edge [px]
@@ -10,18 +11,12 @@ const NEAR = { mouse: 12, pen: 16, touch: 24 }; // from the path, where it can b
 const ENDS = 0.03; // of the duration: nearer to start and goal the path is theirs
 
 export class MovePicture {
-  /**
-   * @param {import("../parts/camera.js").Camera} camera
-   * @param {() => void} turned
-   * @param {(place: import("./plan.js").ViaPoint, event: PointerEvent) => void} grabbed
-   */
   constructor(camera, turned, grabbed) {
     this.camera = camera;
     this.paths = [];
     this.plan = null;
     this.time = null;
-    /** @type {import("./plan.js").ViaPoint|null} The place of the path under the pointer. */
-    this.under = null;
+    this.under = null; // the place of the path under the pointer, a via point
     this.board = new Board(byId("move-canvas"), () => this.paint());
     this.board.resized = () => {
       this.fit();
@@ -37,38 +32,30 @@ export class MovePicture {
     });
     // The page does not scroll with a finger that holds the path.
     canvas.addEventListener("touchstart", (event) => this.under && event.preventDefault(), { passive: false });
-    followTurns(
-      canvas,
-      () => !this.camera.flat && !this.under,
-      (dx, dy) => this.turn(dx, dy),
-    );
+    followTurns(canvas, this);
+  }
+
+  get turns() {
+    return !this.camera.flat && !this.under;
   }
 
   /** Points that must be in the picture: those one can take hold of, and paths unless they run far away. */
   points() {
     const { path, start, goal, via, obstacles } = this.plan;
-    const own = [
-      start,
-      goal,
-      ...via.map((/** @type {any} */ { point }) => point),
-      ...obstacles.map((/** @type {any} */ { center }) => center),
-    ];
+    const own = [start, goal, ...via.map(({ point }) => point), ...obstacles.map(({ center }) => center)];
     const around = [...path, ...own];
     const far = 1.5 * extent(around);
-    const near = (/** @type {number[]} */ point) => Math.hypot(...point.map((value, k) => value - path[0][k])) < far;
+    const near = (point) => distance(point, path[0]) < far;
     return [...around, ...this.paths.flatMap(({ path: drawn }) => drawn.positions.filter(near))];
   }
 
-  /** Find the place of the path under the pointer. @param {PointerEvent|null} event */
+  /** Find the place of the path under the pointer. */
   point(event) {
     const before = this.under;
     this.under = null;
     const drawn = this.paths[0]?.path.positions;
     if (event && drawn) {
-      const away = drawn.map((/** @type {number[]} */ point) => {
-        const [x, y] = this.camera.toScreen(point);
-        return Math.hypot(x - event.offsetX, y - event.offsetY);
-      });
+      const away = drawn.map((point) => distance(this.camera.toScreen(point), [event.offsetX, event.offsetY]));
       const k = away.indexOf(Math.min(...away));
       const at = k / (drawn.length - 1);
       if (away[k] < NEAR[event.pointerType] && at > ENDS && at < 1 - ENDS) this.under = { at, point: [...drawn[k]] };
@@ -77,10 +64,10 @@ export class MovePicture {
     if (before?.at !== this.under?.at) this.board.draw();
   }
 
-  /** The recorded path alone, until it is known how it moves. @param {number[][]} path */
+  /** The recorded path alone, until it is known how it moves. */
   sketch(path) {
     this.paths = [];
-    this.plan = { path, start: path[0], goal: path[path.length - 1], via: [], obstacles: [] };
+    this.plan = { path, start: path[0], goal: path.at(-1), via: [], obstacles: [] };
     this.fit();
   }
 
@@ -104,14 +91,9 @@ export class MovePicture {
   paint() {
     const { context } = this.board;
     if (!this.plan) return;
-    const pixels = (/** @type {number[][]} */ rows) => rows.map((row) => this.camera.toScreen(row));
-    if (!this.camera.flat) this.ground();
-    for (const obstacle of this.plan.obstacles)
-      this.obstacle(
-        this.camera.toScreen(obstacle.center),
-        obstacle.radius * this.camera.scale,
-        this.paths.some(({ path }) => isTouched(obstacle, path.positions)),
-      );
+    const pixels = (rows) => rows.map((row) => this.camera.toScreen(row));
+    if (!this.camera.flat) ground(context, this.camera, bounds(this.plan.path), color("--line"));
+    for (const obstacle of this.plan.obstacles) this.paintObstacle(obstacle);
     line(context, pixels(this.plan.path), { color: color("--gray"), width: 7, alpha: 0.28 });
     for (const { path, look } of this.paths)
       line(context, pixels(path.positions), { color: color(look.color), width: 3.5, dash: look.dash });
@@ -121,9 +103,10 @@ export class MovePicture {
         mark(context, this.camera.toScreen(this.at(path)), "dot", 9, color(look.color));
   }
 
-  /** @param {number[]} at @param {number} radius [px] @param {boolean} touched */
-  obstacle(at, radius, touched) {
+  paintObstacle(obstacle) {
     const { context } = this.board;
+    const [at, radius] = [this.camera.toScreen(obstacle.center), obstacle.radius * this.camera.scale];
+    const touched = this.paths.some(({ path }) => isTouched(obstacle, path.positions));
     const paint = color(touched ? "--failed" : "--purple");
     context.globalAlpha = touched ? 0.4 : 0.22;
     mark(context, at, "dot", radius, paint);
@@ -131,25 +114,15 @@ export class MovePicture {
     mark(context, at, "ring", radius, paint);
   }
 
-  /** A grid below a movement in space, so that one sees how it lies. */
-  ground() {
-    const { path } = this.plan;
-    const low = [0, 1, 2].map((k) => Math.min(...path.map((/** @type {number[]} */ p) => p[k])));
-    const high = [0, 1, 2].map((k) => Math.max(...path.map((/** @type {number[]} */ p) => p[k])));
-    ground(this.board.context, this.camera, low, high, color("--line"));
-  }
-
-  /** Where a path is now; its samples are even in time. @param {any} path */
+  /** Where a path is now; its samples are even in time. */
   at({ times, positions }) {
     const last = times.length - 1;
     const at = Math.min((last * this.time) / (times[last] - times[0]), last);
     const k = Math.min(Math.floor(at), last - 1);
-    return positions[k].map(
-      (/** @type {number} */ value, /** @type {number} */ axis) => value + (at - k) * (positions[k + 1][axis] - value),
-    );
+    return positions[k].map((value, axis) => value + (at - k) * (positions[k + 1][axis] - value));
   }
 
-  turn(/** @type {number} */ dx, /** @type {number} */ dy) {
+  turn(dx, dy) {
     this.camera.turn(dx, dy);
     this.turned();
     this.board.draw();

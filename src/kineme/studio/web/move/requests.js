@@ -10,36 +10,29 @@ import { showPaths } from "./paths.js";
 import { asShown, question } from "./plan.js";
 import { unit } from "./points.js";
 import { movingFormulations } from "./session.js";
-import { Steps } from "./steps.js";
+import { Steps } from "../parts/steps.js";
 import { showStyles } from "./styles.js";
 
 const RESTS = 400; // how long a style slider rests before the primitive is asked for [ms]
 
-/** @typedef {import("./session.js").Session} Session */
-
-/** Start anew with a symbol. @param {Session} session @param {string|undefined} id */
+/** Start anew with a symbol. @param {MoveSession} session */
 export async function chooseSymbol(session, id) {
   const { picture, rollouts } = session;
   const symbol = id && symbolOf(id);
   if (!symbol) return;
-  const chosen = { id: symbol.id };
+  const chosen = { symbol: symbol.id };
   chooseToMove(symbol.id);
   Object.assign(session, { chosen, version: library().version, plan: null, steps: new Steps() });
   session.handles.set([]);
   session.camera.face([symbol.path]);
   picture.sketch(symbol.path);
   byId("move-name").textContent = symbol.name;
-  document.querySelectorAll(".per").forEach((per, k) => {
+  for (const [k, per] of document.querySelectorAll(".per").entries())
     per.textContent = unit() && ` [${unit()}/s${k ? "²" : ""}]`;
-  });
-  const rollout = await tried(() =>
-    server.generate({ what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }),
-  );
+  const rollout = await tried(server.generate({ what: chosen, formulation: FORMULATIONS[0].name }));
   if (session.chosen !== chosen) return; // another symbol since then, or this one anew
-  if (!rollout) {
-    session.chosen = null; // so that it is asked for again
-    return;
-  }
+  if (!rollout) session.chosen = null; // so that it is asked for again
+  if (!rollout) return;
   const plan = asShown(symbol, rollout);
   session.plan = picture.plan = plan;
   for (const each of rollouts.values()) each.reset();
@@ -57,18 +50,13 @@ export async function chooseSymbol(session, id) {
   await prepare(session);
 }
 
-/** Ask for the primitives of what moves. @param {Session} session */
+/** Ask for the primitives of what moves. @param {MoveSession} session */
 async function prepare(session) {
   const { plan, rollouts } = session;
   if (plan) await Promise.all(movingFormulations(session).map((name) => rollouts.get(name).prepare(plan)));
 }
 
-/**
- * Let another style move; its primitive is asked for once the slider rests.
- * @param {Session} session
- * @param {number[]|null} values
- * @param {string} formulation
- */
+/** Let another style move; its primitive is asked for once the slider rests. @param {MoveSession} session */
 function chooseStyle(session, values, formulation) {
   Object.assign(session.plan, { style: values, styled: formulation });
   allowFormulations(values === null);
@@ -78,7 +66,7 @@ function chooseStyle(session, values, formulation) {
   session.resting = setTimeout(() => prepare(session), RESTS);
 }
 
-/** @param {Session} session @param {string[]} names Of the formulations that move. */
+/** Let the formulations of these names move. @param {MoveSession} session */
 export async function tickFormulations(session, names) {
   const added = names.filter((name) => !session.ticked.has(name));
   session.ticked = new Set(names);
@@ -91,7 +79,7 @@ export async function tickFormulations(session, names) {
   }
 }
 
-/** Save the movement as a file. @param {Session} session */
+/** Save the movement as a file. @param {MoveSession} session */
 export function saveMovement(session) {
   if (!session.plan) return;
   const format = byId("export-format").value;

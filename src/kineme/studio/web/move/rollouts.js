@@ -10,21 +10,9 @@ const SETTLED = 120; // how long nothing must change before the server is asked 
 
 const SAMPLES = 201; // as many as the server answers with
 
-/** @type {Map<string, Promise<any>>} */
 const primitives = new Map();
 
-/** @param {any} what @param {string} formulation @returns {Promise<any>} */
-async function ask(what, formulation) {
-  const document = await post("/api/primitive", { what, formulation });
-  return document && openPrimitive(document);
-}
-
-/**
- * @param {any} what
- * @param {string} formulation
- * @param {number} version Of the library.
- * @returns {Promise<any>} Null where only the server knows.
- */
+/** The primitive, or a promise of it, in a version of the library; null where only the server knows. */
 export function primitiveOf(what, formulation, version) {
   const key = JSON.stringify([what, formulation, version]);
   if (!primitives.has(key)) {
@@ -33,36 +21,24 @@ export function primitiveOf(what, formulation, version) {
       primitives.delete(key); // next time it is asked again
       return null;
     };
-    primitives.set(key, ask(what, formulation).catch(failed));
+    const asked = post("/api/primitive", { what, formulation }).then((document) => document && openPrimitive(document));
+    primitives.set(key, asked.catch(failed));
   }
-  return /** @type {Promise<any>} */ (primitives.get(key));
+  return primitives.get(key);
 }
 
-/**
- * What the server would answer to the same question, but for its warnings.
- * @param {any} primitive @param {any} question @returns {any} Null where there is none, or the server has to say why.
- */
-function moved(primitive, { start, goal, duration, via, obstacles }) {
+/** What the server would answer to the same question, but for its warnings; null where only it can say why. */
+function moved(primitive, { obstacles, what, formulation, ...wish }) {
   if (!primitive || obstacles) return null;
   try {
-    const { times, ...path } = primitive.rollout({ start, goal, duration, via, samples: SAMPLES });
+    const { times, ...path } = primitive.rollout({ ...wish, samples: SAMPLES });
     return { times: [...times], ...path, warnings: [] };
   } catch {
     return null;
   }
 }
 
-/** @param {any} question @returns {Promise<{path: any, problem: string}>} */
-async function answerTo(question) {
-  try {
-    return { path: await server.generate(question), problem: "" };
-  } catch (error) {
-    return { path: null, problem: error.message };
-  }
-}
-
 export class Rollouts {
-  /** @param {string} formulation @param {() => void} changed */
   constructor(formulation, changed) {
     this.formulation = formulation;
     this.changed = changed;
@@ -83,7 +59,6 @@ export class Rollouts {
     Object.assign(this, { path: null, problem: "", wanted: null, primitive: null, preparing: "" });
   }
 
-  /** @param {any} plan */
   async prepare(plan) {
     this.primitive = null;
     const key = JSON.stringify(what(plan));
@@ -92,7 +67,7 @@ export class Rollouts {
     if (this.preparing === key) this.primitive = primitive;
   }
 
-  /** @param {any} plan The newest. */
+  /** Show how the newest plan moves. */
   follow(plan) {
     this.wanted = question(plan, this.formulation);
     clearTimeout(this.timer);
@@ -109,10 +84,10 @@ export class Rollouts {
     while (this.wanted) {
       const [wanted, movement] = [this.wanted, this.movement];
       this.wanted = null;
-      const { path, problem } = await answerTo(wanted);
+      const answer = await server.generate(wanted).catch((error) => ({ error }));
       if (movement !== this.movement) continue;
-      this.problem = problem;
-      if (path && (!this.wanted || !this.primitive || wanted.obstacles)) this.path = path;
+      this.problem = answer.error?.message ?? "";
+      if (!answer.error && (!this.wanted || !this.primitive || wanted.obstacles)) this.path = answer;
       this.changed();
     }
     this.asking = false;

@@ -7,19 +7,14 @@ import { Handles } from "./handles.js";
 import { MovePicture } from "./picture.js";
 import { extent, rounded } from "./plan.js";
 import { Rollouts } from "./rollouts.js";
-import { Steps } from "./steps.js";
+import { Steps } from "../parts/steps.js";
 
 export class Session {
-  /**
-   * @param {Object} page
-   * @param {(session: Session) => void} page.moved A path is another one.
-   * @param {(session: Session, dragging: boolean) => void} page.dragged A point is held, or let go.
-   * @param {(session: Session, place: import("./plan.js").ViaPoint, event: PointerEvent) => void} page.grabbed
-   */
+  /** The page is told when a path is another one, and when a point or the path is held. */
   constructor(page) {
-    /** @type {import("./plan.js").Plan|null} */
+    /** @type {Plan|null} */
     this.plan = null;
-    /** @type {{id: string}|null} The symbol that moves; another object whenever it starts anew. */
+    /** @type {{symbol: string}|null} What moves; another object whenever it starts anew. */
     this.chosen = null;
     this.version = -1; // of the library when the symbol was chosen
     this.dragging = false; // a point is held
@@ -38,12 +33,10 @@ export class Session {
     this.acceleration = new Plot(byId("plot-acceleration"));
     this.ticked = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map(({ name }) => [name, new Rollouts(name, () => page.moved(this))]));
-    /** @type {string|null} Formulations in it. */
-    this.legend = null;
-    this.playback = {}; // that is under way
+    this.legend = null; // formulations in it
     this.resting = 0; // timer that waits until a style slider rests
   }
 }
 
-/** Formulations that move: those that are ticked; a style moves in its own alone. @param {Session} session */
+/** Formulations that move: those that are ticked; a style moves in its own alone. @param {MoveSession} session */
 export const movingFormulations = ({ plan, ticked }) => (plan?.style ? [plan.styled] : [...ticked]);

@@ -2,7 +2,7 @@
 import { toMove } from "../parts/chosen.js";
 import { byId } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
-import { library, onLibrary } from "../parts/library_state.js";
+import { library } from "../parts/library_state.js";
 import { isRedo, isUndo } from "../parts/shortcuts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { addObstacle, addVia, grabPath, showDragging, step, stretch } from "./edits.js";
@@ -12,28 +12,22 @@ import { showPick } from "./pick.js";
 import { chooseSymbol, saveMovement, tickFormulations } from "./requests.js";
 import { Session } from "./session.js";
 
-/** Hide the parts of the view where no symbol can move, and say so. @param {boolean} empty */
-function showParts(empty) {
-  byId("move-empty").hidden = !empty;
-  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = empty;
-}
-
-/** The view is shown, or the library changed. @param {Session} session */
+/** The view is shown, or the library changed. @param {MoveSession} session */
 function showView(session) {
-  if (currentView() !== "move") return;
   const { symbols, version } = library();
   const id = toMove(symbols);
-  showParts(id === null);
+  byId("move-empty").hidden = id !== null;
+  for (const part of ["pick-part", "move-hint", "move-tools", "move-plots", "move-panel"])
+    byId(part).hidden = id === null;
   showPick(id, (chosen) => chooseSymbol(session, chosen));
   if (id === null) session.plan = session.picture.plan = session.chosen = null;
-  else if (session.chosen?.id !== id || session.version !== version) chooseSymbol(session, id);
+  else if (session.chosen?.symbol !== id || session.version !== version) chooseSymbol(session, id);
 }
 
-/** @param {Session} session @param {KeyboardEvent} event */
+/** @param {MoveSession} session */
 function hearKey(session, event) {
   if (currentView() !== "move") return;
-  const target = /** @type {Element} */ (event.target);
-  if (event.key === " " && !target.closest("button, input, select, summary, textarea, dialog")) {
+  if (event.key === " " && !event.target.closest("button, input, select, summary, textarea, dialog")) {
     event.preventDefault();
     play(session);
   } else if (isUndo(event)) step(session, -1);
@@ -43,25 +37,19 @@ function hearKey(session, event) {
   }
 }
 
-/** @param {Session} session */
-function listen(session) {
-  byId("move-play").addEventListener("click", () => play(session));
-  byId("add-via").addEventListener("click", () => addVia(session));
-  byId("add-obstacle").addEventListener("click", () => addObstacle(session));
-  byId("move-undo").addEventListener("click", () => step(session, -1));
-  byId("move-redo").addEventListener("click", () => step(session, 1));
-  byId("move-reset").addEventListener("click", () => chooseSymbol(session, session.plan?.symbol));
-  byId("export").addEventListener("click", () => saveMovement(session));
-  byId("duration").addEventListener("input", () => stretch(session));
+export function startMove() {
+  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
+  startFormulations((names) => tickFormulations(session, names));
+  byId("move-play").onclick = () => play(session);
+  byId("add-via").onclick = () => addVia(session);
+  byId("add-obstacle").onclick = () => addObstacle(session);
+  byId("move-undo").onclick = () => step(session, -1);
+  byId("move-redo").onclick = () => step(session, 1);
+  byId("move-reset").onclick = () => chooseSymbol(session, session.plan?.symbol);
+  byId("export").onclick = () => saveMovement(session);
+  byId("duration").oninput = () => stretch(session);
   document.addEventListener("keydown", (event) => hearKey(session, event));
   const pick = () => showPick(session.plan?.symbol ?? null, (chosen) => chooseSymbol(session, chosen));
   startFinding(byId("find-pick"), pick, () => byId("move-pick").querySelector("input"));
   onShow("move", () => showView(session));
-  onLibrary(() => showView(session));
-}
-
-export function startMove() {
-  const session = new Session({ moved: showPaths, dragged: showDragging, grabbed: grabPath });
-  startFormulations((names) => tickFormulations(session, names));
-  listen(session);
 }

@@ -6,30 +6,17 @@ import { Overlay } from "./overlay.js";
 const ROWS = 5;
 const BEGUN = 0.1; // share of the path from which a name is said: every beginning is unlike the whole
 const ALIKE = 0.05; // of the size: differences that are no more than people's hands
-const percent = (/** @type {number} */ share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
-const capital = (/** @type {string} */ word) => word[0].toUpperCase() + word.slice(1);
-const pValue = (/** @type {number} */ p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
+const percent = (share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
+const capital = (word) => word[0].toUpperCase() + word.slice(1);
+const pValue = (p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
 
-/** @param {string} name */
-function row(name) {
-  const parts = {
-    name: make("span", { class: "rank-name" }, name),
-    value: make("span", { class: "rank-value numbers" }),
-    bar: make("span", { class: "fill" }),
-  };
-  return {
-    ...parts,
-    element: make(
-      "li",
-      { class: "rank" },
-      parts.name,
-      parts.value,
-      make("span", { class: "meter", "aria-hidden": "true" }, parts.bar),
-    ),
-  };
+function row() {
+  const [name, value, bar] = ["rank-name", "rank-value numbers", "fill"].map((look) => make("span", look));
+  const meter = make("span", { class: "meter", "aria-hidden": "true" }, bar);
+  return { name, value, bar, element: make("li", "rank", name, value, meter) };
 }
 
-/** Where and by how much a drawing differs from an example. @param {any} overlay Of an explanation. */
+/** Where and by how much a drawing differs from an example. */
 function differs({ largest_difference: most, from, to }) {
   const size = `${Math.round(100 * most)} % of its size`;
   return most <= ALIKE
@@ -38,10 +25,10 @@ function differs({ largest_difference: most, from, to }) {
 }
 
 export class AnswerPanel {
-  /** @param {{picture?: (name: string) => number[][]|null, advice?: () => string}} page */
-  constructor({ picture = () => null, advice = () => "" } = {}) {
-    this.page = { picture, advice };
-    this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
+  /** The page has pictures of names, and may give advice. @param {any} page */
+  constructor(page = {}) {
+    this.page = page;
+    this.rows = Array.from({ length: ROWS }, row);
     fill(byId("ranks"), ...this.rows.map((line) => line.element));
     this.nearest = new Overlay(byId("nearest"));
     this.overlays = [0, 1].map(() => {
@@ -60,11 +47,7 @@ export class AnswerPanel {
     this.why([]);
   }
 
-  /**
-   * @param {string} kind @param {string} word @param {string} note
-   * @param {string} state open, doubtful, known or unknown
-   * @param {string|null} like The symbol whose picture is beside them.
-   */
+  /** Open, doubtful, known or unknown is the state; the picture beside is of the symbol that it is like. */
   words(kind, word, note, state, like = null) {
     write(byId("verdict-kind"), kind);
     if (byId("verdict").textContent !== word) fill(byId("verdict"), ...breakable(word));
@@ -73,17 +56,17 @@ export class AnswerPanel {
     byId("verdict").parentElement.dataset.state = state;
     if (like === this.like) return;
     this.like = like;
-    this.show(like && this.page.picture(like));
+    this.show(like && this.page.picture?.(like));
   }
 
-  /** Beside the words: an example. @param {number[][]|null} path */
+  /** Beside the words: an example. */
   show(path) {
     byId("nearest").hidden = !path;
     byId("nearest").setAttribute("aria-label", `Like an example of ${this.like}`);
     this.nearest.show(path && { path });
   }
 
-  /** @param {string[]} reasons Sentences with the numbers, for who asks. */
+  /** Reasons are sentences with the numbers, for who asks. */
   why(reasons) {
     byId("why").hidden = !reasons.length;
     byId("why-pictures").hidden = true;
@@ -91,7 +74,7 @@ export class AnswerPanel {
     fill(byId("why-text"), ...reasons.map((text) => make("p", {}, text)));
   }
 
-  /** The drawing over its nearest example, and over the runner-up. @param {any} explanation */
+  /** The drawing over its nearest example, and over the runner-up. */
   explain({ path: drawn, nearest, runner_up: other }) {
     byId("why-pictures").hidden = false;
     this.show(nearest.path);
@@ -100,42 +83,30 @@ export class AnswerPanel {
       caption.parentElement.hidden = !shown;
       if (!shown) continue;
       overlay.show({ ...shown, drawn });
-      write(
-        caption,
-        `${k ? "Next" : "Nearest"}: ${shown.label}, ${shown.similarity.toFixed(2)} alike; ${differs(shown)}`,
-      );
+      const alike = `${shown.label}, ${shown.similarity.toFixed(2)} alike`;
+      write(caption, `${k ? "Next" : "Nearest"}: ${alike}; ${differs(shown)}`);
     }
   }
 
-  /** @param {number} share */
   progress(share) {
     const meter = byId("draw-progress");
-    if (!meter) return;
-    meter.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    /** @type {HTMLElement} */ (meter.firstElementChild).style.setProperty("--share", String(share));
+    meter?.setAttribute("aria-valuenow", String(Math.round(100 * share)));
+    meter?.querySelector("div").style.setProperty("--share", share);
   }
 
-  /**
-   * How likely each name is, if it is a known one: the same while it is drawn and after.
-   * @param {{label: string, probability: number|null}[]} ranked
-   */
+  /** How likely each name is, if it is a known one: the same while it is drawn and after. */
   list(ranked) {
     write(byId("ranks-kind"), ranked.length ? "If it is a known one" : "\u00a0");
-    for (const [k, row] of this.rows.entries())
-      this.set(row, ranked[k]?.label ?? "\u00a0", ranked[k]?.probability ?? null);
+    for (const [k, { name, value, bar, element }] of this.rows.entries()) {
+      const { label = "\u00a0", probability = null } = ranked[k] ?? {};
+      write(name, label);
+      write(value, probability === null ? "" : percent(probability));
+      bar.style.setProperty("--share", String(probability ?? 0));
+      element.classList.toggle("nothing", probability === null);
+    }
   }
 
-  set(/** @type {any} */ line, /** @type {string} */ name, /** @type {number|null} */ value) {
-    write(line.name, name);
-    write(line.value, value === null ? "" : percent(value));
-    line.bar.style.setProperty("--share", String(value ?? 0));
-    line.element.classList.toggle("nothing", value === null);
-  }
-
-  /**
-   * While it is drawn: it looks like something, or is open, so that the end contradicts neither.
-   * @param {any} state @param {number} now Time of the last sample [s].
-   */
+  /** While it is drawn, until now [s]: it looks like something, or is open, so that the end contradicts neither. */
   drawing({ ranked, label, certainty, progress, arrival }, now) {
     const name = label ?? ranked[0]?.label;
     const left = Number.isFinite(arrival) ? `, arrives in ${Math.max(arrival - now, 0).toFixed(1)} s` : "";
@@ -150,14 +121,14 @@ export class AnswerPanel {
     if (label !== null && certainty) this.speak(`Looks like ${name}, so far.`);
   }
 
-  /** Of the whole movement. @param {any} answer @param {() => any} explain Its explanation, or a promise of it. */
+  /** Of the whole movement; `explain` gives its explanation, or a promise of it. */
   final(answer, explain) {
     const { label, certainty, ranked, rule, p_known: known, promise } = answer;
     const [name, word] = [label ?? ranked[0].label, capital(certainty)];
     const note = [
       label === null ? `Most like ${name}.` : "",
       rule === "guess" ? "More drawings of each would say how sure." : "",
-      label === null ? "" : this.page.advice(),
+      label === null ? "" : this.page.advice?.(),
     ].join(" ");
     const state = { new: "unknown", "looks like": "open" }[certainty] ?? "known";
     this.words(word, label ?? "Unknown", note.trim(), state, name);
@@ -166,19 +137,21 @@ export class AnswerPanel {
     this.list(ranked);
     const pValues = ranked
       .slice(0, ROWS)
-      .filter((/** @type {any} */ candidate) => candidate.p_value !== null)
-      .map((/** @type {any} */ candidate) => `${candidate.label} ${pValue(candidate.p_value)}`);
+      .filter(({ p_value: p }) => p !== null)
+      .map(({ label, p_value: p }) => `${label} ${pValue(p)}`);
     this.why([`p-value of being known: ${pValue(known)}; of names: ${pValues.join(", ")}`, promise]);
     this.speak(label === null ? "New: unknown." : `${word} ${label}.`);
     this.answer = answer;
-    const asked = async () => {
-      const explanation = await explain();
+    // After the answer is there; without the server there are no pictures.
+    setTimeout(async () => {
+      const explanation = await Promise.resolve()
+        .then(explain)
+        .catch(() => null);
       if (explanation && this.answer === answer) this.explain(explanation);
-    };
-    setTimeout(() => asked().catch(() => {})); // after the answer is there; without the server there are no pictures
+    });
   }
 
-  /** To a screen reader, once each. @param {string} text */
+  /** To a screen reader, once each. */
   speak(text) {
     if (text === this.last || !byId("spoken")) return;
     this.last = text;

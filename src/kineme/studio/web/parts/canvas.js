@@ -1,10 +1,9 @@
 // A canvas as sharp as the screen, drawn once per frame and only when something changed.
 
-/** @type {Set<Board>} */
 const boards = new Set();
 
 export class Board {
-  /** @param {HTMLCanvasElement} canvas @param {(board: Board) => void} paint */
+  /** @param {(board: Board) => void} paint */
   constructor(canvas, paint) {
     this.canvas = canvas;
     this.paint = paint;
@@ -12,8 +11,8 @@ export class Board {
     this.width = 0;
     this.height = 0;
     this.frame = 0;
-    /** @type {(() => void)|null} After the canvas has another size. */
-    this.resized = null;
+    this.resized = null; // what follows when the canvas has another size
+    this.running = null;
     boards.add(this);
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();
@@ -41,6 +40,16 @@ export class Board {
     });
   }
 
+  /** Call in each frame with the seconds since now, until that is false or another run begins. */
+  run(step) {
+    const began = performance.now();
+    const next = (now) => {
+      if (this.running === next && step(Math.max(now - began, 0) / 1000)) requestAnimationFrame(next);
+    };
+    this.running = next;
+    requestAnimationFrame(next);
+  }
+
   /** Paint at once. */
   now() {
     if (!this.width) return;
@@ -49,30 +58,27 @@ export class Board {
   }
 }
 
-/** @type {Map<string, string>} */
 const colors = new Map();
 
-/** The color that a token has now. @param {string} token @returns {string} */
+/** The color that a token has now. */
 export function color(token) {
   if (!colors.has(token)) colors.set(token, getComputedStyle(document.documentElement).getPropertyValue(token).trim());
-  return /** @type {string} */ (colors.get(token));
+  return colors.get(token);
 }
 
-/**
- * Paint the board of a canvas with another context, in the colors of paper.
- * @param {HTMLCanvasElement} canvas
- * @param {(board: Board) => any} contextOf
- */
+/** Paint the board of a canvas with another context, in the colors of paper. */
 export function paintOnPaper(canvas, contextOf) {
   const board = [...boards].find((other) => other.canvas === canvas);
   const rules = /** @type {CSSStyleRule[]} */ ([...document.styleSheets].flatMap(({ cssRules }) => [...cssRules]));
   const { style } = rules.find((rule) => rule.selectorText === ":root");
   for (const token of style) colors.set(token, style.getPropertyValue(token).trim());
   const screen = board.context;
-  board.context = contextOf(board);
+  const context = contextOf(screen);
+  board.context = context;
   board.paint(board);
   board.context = screen;
   recolor();
+  return context;
 }
 
 /** Paint again, after tokens have other colors. */

@@ -2,11 +2,10 @@
 import { byId } from "./elements.js";
 
 /**
- * @param {{title: string, text?: string, yes?: string, name?: string|null, danger?: boolean}} question
- *   `name` is what the field holds at first; without it there is no field.
+ * Ask for a name, which the field holds at first, or without it for yes.
  * @returns {Promise<string|null>} The name, or "yes"; null if it was cancelled.
  */
-export function ask({ title, text = "", yes = "OK", name = null, danger = false }) {
+export function ask({ title, yes, text = "", name = null, danger = false }) {
   const dialog = byId("ask");
   byId("ask-title").textContent = title;
   byId("ask-text").textContent = text;
@@ -21,17 +20,16 @@ export function ask({ title, text = "", yes = "OK", name = null, danger = false 
   (name === null ? byId("ask-yes") : byId("ask-name")).focus();
   byId("ask-name").select();
   return new Promise((done) => {
-    dialog.addEventListener(
-      "close",
-      () => done(dialog.returnValue === "yes" ? (name === null ? "yes" : byId("ask-name").value.trim() || null) : null),
-      { once: true },
-    );
+    dialog.onclose = () => {
+      const answer = name === null ? "yes" : byId("ask-name").value.trim();
+      done((dialog.returnValue === "yes" && answer) || null);
+    };
   });
 }
 
 // Enter in the field means yes, not the first button.
-byId("ask-name").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+byId("ask-name").onkeydown = (event) => {
   if (event.key !== "Enter" || event.isComposing) return;
   event.preventDefault();
   if (byId("ask-name").value.trim()) byId("ask").close("yes");
-});
+};

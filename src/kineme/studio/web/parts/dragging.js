@@ -1,22 +1,18 @@
 // A thing is held and dragged until it is let go, or is gone. A second finger on the same thing is not heard.
 
 const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
-const TURNS = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
+const TURN = 12; // by an arrow key [px]
 
-/** @type {WeakSet<HTMLElement>} */
+/** Where arrow keys go on the screen. */
+export const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
 const held = new WeakSet();
 
-/**
- * @param {HTMLElement} element
- * @param {PointerEvent} event That takes hold of it.
- * @param {(now: PointerEvent) => void} go
- * @param {() => void} end
- * @returns {boolean} Whether it is held from now on.
- */
+/** Hold an element from an event on. @param {(now: PointerEvent) => void} go @returns Whether it is held. */
 export function drag(element, event, go, end = () => {}) {
   if (event.button !== 0 || held.has(element)) return false;
-  const ours = (/** @type {PointerEvent} */ now) => now.pointerId === event.pointerId && go(now);
-  const lost = (/** @type {PointerEvent} */ now) => {
+  const ours = (now) => now.pointerId === event.pointerId && go(now);
+  const lost = (now) => {
     if (now.pointerId !== event.pointerId) return;
     held.delete(element);
     element.removeEventListener("pointermove", ours);
@@ -31,20 +27,15 @@ export function drag(element, event, go, end = () => {}) {
   return true;
 }
 
-/**
- * Turn a view in space by dragging its background, and by the arrow keys.
- * @param {HTMLCanvasElement} canvas
- * @param {() => boolean} turns Whether it can be turned now.
- * @param {(dx: number, dy: number) => void} turn By pixels.
- */
-export function followTurns(canvas, turns, turn) {
+/** Turn a view in space, while it `turns`, by dragging its background, and by the arrow keys: by pixels. */
+export function followTurns(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
-    if (turns()) drag(canvas, event, (now) => turn(now.movementX, now.movementY));
+    if (view.turns) drag(canvas, event, (now) => view.turn(now.movementX, now.movementY));
   });
   canvas.addEventListener("keydown", (event) => {
-    const step = TURNS[event.key];
-    if (!step || !turns()) return;
+    const [dx, dy] = ARROWS[event.key] ?? [];
+    if (dx === undefined || !view.turns) return;
     event.preventDefault();
-    turn(step[0], step[1]);
+    view.turn(TURN * dx, TURN * dy);
   });
 }

@@ -8,17 +8,13 @@ const BETTER = 1.1; // how much larger the area must be from a view that is less
 const ASKEW = 0.4;
 const STEP = Math.PI / 12;
 
-/** Directions on the screen: right and up. @param {{around: number, above: number}} view */
+/** Directions on the screen: right and up. */
 export function axesOf({ around, above }) {
   const [c, s] = [Math.cos(around), Math.sin(around)];
   return { right: [c, s, 0], up: [-s * Math.sin(above), c * Math.sin(above), Math.cos(above)] };
 }
 
-/**
- * How coordinates of paths vary together, each path about its middle.
- * @param {number[][][]} paths
- * @returns {number[][]}
- */
+/** How coordinates of paths vary together, each path about its middle. */
 function variances(paths) {
   const sums = [0, 1, 2].map(() => [0, 0, 0]);
   for (const path of paths) {
@@ -30,12 +26,12 @@ function variances(paths) {
   return sums;
 }
 
-/** @param {number[][][]} paths In space. @returns {{around: number, above: number}} */
+/** The view from where paths in space are seen best. */
 export function facing(paths) {
   const varied = variances(paths);
-  const along = (/** @type {number[]} */ a, /** @type {number[]} */ b) =>
+  const along = (a, b) =>
     a.reduce((sum, value, j) => sum + value * b.reduce((more, other, k) => more + varied[j][k] * other, 0), 0);
-  const area = (/** @type {{around: number, above: number}} */ view) => {
+  const area = (view) => {
     const { right, up } = axesOf(view);
     const askew = Math.sin(view.above) * Math.abs(Math.sin(view.around));
     return (1 - ASKEW * askew) * (along(right, right) * along(up, up) - along(right, up) ** 2);

@@ -2,21 +2,13 @@
 
 const MANY = 12;
 
-/**
- * @param {HTMLInputElement} field @param {() => void} changed What shows those that are found.
- * @param {() => HTMLElement|null} first What Enter presses.
- */
+/** Show what is found whenever the field has changed; Enter presses the first. */
 export function startFinding(field, changed, first) {
   field.addEventListener("input", changed);
   field.addEventListener("keydown", (event) => event.key === "Enter" && first()?.click());
 }
 
-/**
- * Symbols with all words of the field in their name or description.
- * @param {HTMLInputElement} field
- * @param {any[]} symbols
- * @returns {any[]}
- */
+/** Symbols with all words of the field in their name or description. @param {HTMLInputElement} field */
 export function matching(field, symbols) {
   field.hidden = symbols.length <= MANY;
   if (field.hidden) field.value = "";

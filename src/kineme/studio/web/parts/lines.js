@@ -1,4 +1,4 @@
-// Lines and marks on a canvas.
+// Lines, marks and words on a canvas.
 
 const CELLS = 6; // of the ground
 
@@ -9,65 +9,45 @@ export function readableOn(hex) {
 }
 
 /**
- * @param {CanvasRenderingContext2D} context @param {number[][]} points In pixels.
- * @param {{color: string, width?: number, dash?: number[], alpha?: number}} options
+ * @param {CanvasRenderingContext2D} context
+ * @param {number[][]} points In pixels.
+ * @param {{color: string, width?: number, dash?: number[], alpha?: number}} look
  */
 export function line(context, points, { color, width = 3, dash = [], alpha = 1 }) {
   if (points.length < 2) return;
   context.save();
-  Object.assign(context, {
-    strokeStyle: color,
-    lineWidth: width,
-    lineCap: "round",
-    lineJoin: "round",
-    globalAlpha: alpha,
-  });
+  Object.assign(context, { strokeStyle: color, lineWidth: width, globalAlpha: alpha });
+  Object.assign(context, { lineCap: "round", lineJoin: "round" });
   context.setLineDash(dash);
   context.beginPath();
-  context.moveTo(points[0][0], points[0][1]);
-  for (let i = 1; i < points.length; i += 1) context.lineTo(points[i][0], points[i][1]);
+  for (const [x, y] of points) context.lineTo(x, y);
   context.stroke();
   context.restore();
 }
 
-/** @type {Record<string, (context: CanvasRenderingContext2D, r: number) => void>} */
-const MARKS = {
-  dot: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
-  ring: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
-  square: (context, r) => context.rect(-r, -r, 2 * r, 2 * r),
-  diamond: (context, r) =>
-    corners(context, [
-      [0, -1.3 * r],
-      [1.3 * r, 0],
-      [0, 1.3 * r],
-      [-1.3 * r, 0],
-    ]),
-  triangle: (context, r) =>
-    corners(context, [
-      [0, -1.3 * r],
-      [1.2 * r, r],
-      [-1.2 * r, r],
-    ]),
-};
-
-function corners(/** @type {CanvasRenderingContext2D} */ context, /** @type {number[][]} */ points) {
-  context.moveTo(points[0][0], points[0][1]);
-  for (const [x, y] of points.slice(1)) context.lineTo(x, y);
-  context.closePath();
+/** Words that stand out from what they are on. */
+export function words(context, text, x, y, color, surface) {
+  Object.assign(context, { lineWidth: 4, lineJoin: "round", strokeStyle: surface, fillStyle: color });
+  context.strokeText(text, x, y);
+  context.fillText(text, x, y);
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {number[]} at
- * @param {string} kind
- * @param {number} r
- * @param {string} color
- */
+/** x and y of the corners of a mark, in radii; a mark without corners is round. */
+const CORNERS = {
+  square: [-1, -1, 1, -1, 1, 1, -1, 1],
+  diamond: [0, -1.3, 1.3, 0, 0, 1.3, -1.3, 0],
+  triangle: [0, -1.3, 1.2, 1, -1.2, 1],
+};
+
+/** @param {CanvasRenderingContext2D} context @param {number[]} at */
 export function mark(context, [x, y], kind, r, color) {
+  const corners = CORNERS[kind] ?? [];
   context.save();
   context.translate(x, y);
   context.beginPath();
-  MARKS[kind](context, r);
+  if (!corners.length) context.arc(0, 0, r, 0, 2 * Math.PI);
+  for (let k = 0; k < corners.length; k += 2) context.lineTo(r * corners[k], r * corners[k + 1]);
+  context.closePath();
   if (kind === "ring") Object.assign(context, { strokeStyle: color, lineWidth: 2 }).stroke();
   else Object.assign(context, { fillStyle: color }).fill();
   context.restore();
@@ -76,28 +56,19 @@ export function mark(context, [x, y], kind, r, color) {
 /**
  * A grid below a movement in space, so that one sees how it lies.
  * @param {CanvasRenderingContext2D} context
- * @param {import("./camera.js").Camera} camera
- * @param {number[]} low Corner.
- * @param {number[]} high
- * @param {string} color
+ * @param {Camera} camera
+ * @param {number[][]} corners The lowest and the highest.
  */
-export function ground(context, camera, low, high, color) {
+export function ground(context, camera, [low, high], color) {
+  const edge = (...ends) =>
+    line(
+      context,
+      ends.map(([x, y]) => camera.toScreen([x, y, low[2]])),
+      { color, width: 1 },
+    );
   for (let k = 0; k <= CELLS; k += 1) {
     const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / CELLS);
-    for (const ends of [
-      [
-        [x, low[1]],
-        [x, high[1]],
-      ],
-      [
-        [low[0], y],
-        [high[0], y],
-      ],
-    ])
-      line(
-        context,
-        ends.map(([a, b]) => camera.toScreen([a, b, low[2]])),
-        { color, width: 1 },
-      );
+    edge([x, low[1]], [x, high[1]]);
+    edge([low[0], y], [high[0], y]);
   }
 }

@@ -4,7 +4,7 @@ const WAIT = [300, 600, 1200, 2500, 5000]; // between tries [ms]
 
 /** One connection; each kind of message goes to the function of its name: state, answer, changed, error, here, away. */
 export class Live {
-  /** @param {Record<string, (value: any) => void>} hear */
+  /** @param {Record<string, (value?: any) => void>} hear */
   constructor(hear) {
     this.hear = hear;
     this.tries = 0;
@@ -13,32 +13,23 @@ export class Live {
   }
 
   open() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    this.socket = new WebSocket(`${scheme}://${location.host}/api/live`);
-    this.socket.addEventListener("open", () => this.opened());
-    this.socket.addEventListener("message", (event) => this.heard(event.data));
-    this.socket.addEventListener("close", () => this.closed());
+    this.socket = new WebSocket(`${location.origin.replace("http", "ws")}/api/live`);
+    this.socket.onopen = () => {
+      this.tries = 0;
+      this.send({ watch: true });
+      this.hear.here();
+    };
+    this.socket.onmessage = ({ data }) => {
+      for (const [kind, value] of Object.entries(JSON.parse(data))) this.hear[kind]?.(value);
+    };
+    this.socket.onclose = () => {
+      this.hear.away();
+      setTimeout(() => this.open(), WAIT[Math.min(this.tries, WAIT.length - 1)]);
+      this.tries += 1;
+    };
   }
 
-  opened() {
-    this.tries = 0;
-    this.send({ watch: true });
-    this.hear.here(true);
-  }
-
-  closed() {
-    this.hear.away(true);
-    setTimeout(() => this.open(), WAIT[Math.min(this.tries, WAIT.length - 1)]);
-    this.tries += 1;
-  }
-
-  /** @param {string} text */
-  heard(text) {
-    const message = JSON.parse(text);
-    for (const [kind, value] of Object.entries(message)) this.hear[kind]?.(value);
-  }
-
-  /** @param {any} message @returns {boolean} Whether it could be sent. */
+  /** @returns Whether it could be sent. */
   send(message) {
     if (this.socket.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(message));

@@ -3,9 +3,7 @@ import { get, post } from "./api.js";
 import { openArm } from "./arm_frame.js";
 import { byId } from "./elements.js";
 
-/** @type {((message: Object) => void)|null} To the frame of the arm; null while there is none. */
-let send = null;
-/** @type {{robot: string, hand: number[], joints: number[]|null}} */
+let send = null; // to the frame of the arm, once there is one
 const state = { robot: "", hand: [0, 0], joints: null };
 let [asking, newer] = [false, false];
 
@@ -24,7 +22,7 @@ async function follow() {
   asking = false;
 }
 
-/** @param {number[]} sample Of the canvas, which is 1 high: a time, across and up. */
+/** A sample of the canvas, which is 1 high, is a time, across and up. */
 export function mirror([, x, y]) {
   const { width, height } = byId("draw-canvas").getBoundingClientRect();
   const half = Math.min(width / height, 1) / 2;
@@ -33,7 +31,7 @@ export function mirror([, x, y]) {
 }
 
 export function startMirror() {
-  byId("mirror").addEventListener("toggle", async () => {
+  byId("mirror").ontoggle = async () => {
     if (!byId("mirror").open || send) return;
     const arms = await get("/api/robots").catch((error) => ({ why: error.message }));
     byId("mirror-note").textContent = arms.why ?? "Its tip goes where you draw.";
@@ -45,5 +43,5 @@ export function startMirror() {
     ]);
     to({ scene, joints: [] });
     send = to;
-  });
+  };
 }

@@ -6,13 +6,12 @@ import { line, mark } from "./lines.js";
 const FAR = 0.3; // of the size of the drawing: the other color
 
 export class Overlay {
-  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.shown = null;
     this.board = new Board(canvas, () => this.paint());
   }
 
-  /** @param {{path: number[][], drawn?: number[][], differences?: number[]}|null} shown An example, alone or not. */
+  /** Show the path of an example, alone or with what was drawn and its differences; null for none. */
   show(shown) {
     this.shown = shown;
     this.board.draw();

@@ -4,10 +4,7 @@ import { line } from "./lines.js";
 
 const EDGE = { left: 8, right: 8, top: 18, bottom: 20 };
 
-/** @typedef {{times: number[], values: number[], look: {color: string, dash: number[]}}} Curve */
-
 export class Plot {
-  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     /** @type {Curve[]} */
     this.curves = [];
@@ -24,20 +21,15 @@ export class Plot {
   paint() {
     if (!this.curves.length) return;
     const { context, width, height } = this.board;
-    const end = Math.max(...this.curves.map((curve) => curve.times[curve.times.length - 1]), 1e-9);
+    const end = Math.max(...this.curves.map((curve) => curve.times.at(-1)), 1e-9);
     const high = Math.max(...this.curves.flatMap((curve) => curve.values), 1e-9);
     const [w, h] = [width - EDGE.left - EDGE.right, height - EDGE.top - EDGE.bottom];
-    const at = (/** @type {number} */ t, /** @type {number} */ v) => [
-      EDGE.left + (w * t) / end,
-      EDGE.top + h * (1 - v / high),
-    ];
+    const at = (t, v) => [EDGE.left + (w * t) / end, EDGE.top + h * (1 - v / high)];
     line(context, [at(0, 0), at(end, 0)], { color: color("--line"), width: 1 });
-    for (const curve of this.curves)
-      line(
-        context,
-        curve.times.map((t, k) => at(t - curve.times[0], curve.values[k])),
-        { color: color(curve.look.color), width: 2.2, dash: curve.look.dash },
-      );
+    for (const { times, values, look } of this.curves) {
+      const points = times.map((t, k) => at(t - times[0], values[k]));
+      line(context, points, { color: color(look.color), width: 2.2, dash: look.dash });
+    }
     if (this.cursor !== null && this.cursor <= end)
       line(context, [at(this.cursor, 0), at(this.cursor, high)], { color: color("--text"), width: 1.5 });
     Object.assign(context, { font: `12px ${color("--font")}`, fillStyle: color("--soft"), textAlign: "left" });
@@ -47,6 +39,3 @@ export class Plot {
     context.fillText(`${end.toFixed(2)} s`, width - EDGE.right, height - 5);
   }
 }
-
-/** @param {number[][]} rows @returns {number[]} Length of each. */
-export const lengths = (rows) => rows.map((row) => Math.hypot(...row));

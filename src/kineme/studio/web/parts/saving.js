@@ -3,22 +3,27 @@ import { paintOnPaper } from "./canvas.js";
 import { byId, make } from "./elements.js";
 import { svg } from "./thumbnails.js";
 
-/** Canvas -> the element that says what it shows. */
-const NAMES = {
-  "draw-canvas": "verdict",
-  map: "map-title",
-  "move-canvas": "move-name",
-  "timeline-canvas": "recording-name",
-};
 const HEAD = 40; // height of the name [px]
 const SHARP = 2; // pixels of a PNG for one on the screen
 
 /** A context that writes SVG: as much of one as the pictures use; circles are whole. */
-class Drawing extends /** @type {any} */ (Object) {
-  /** @param {CanvasRenderingContext2D} screen */
+class Drawing {
+  items = [];
+  saved = [];
+  x = 0;
+  y = 0;
+  d = "";
+  dash = "none";
+  globalAlpha = 1;
+  lineCap = "butt";
+  lineJoin = "miter";
+  lineWidth;
+  strokeStyle;
+  fillStyle;
+  font;
+  textAlign;
   constructor(screen) {
-    super();
-    Object.assign(this, { screen, items: [], saved: [], x: 0, y: 0, d: "", dash: "none", globalAlpha: 1 });
+    this.screen = screen;
   }
   save() {
     this.saved.push({ ...this });
@@ -40,7 +45,7 @@ class Drawing extends /** @type {any} */ (Object) {
     this.d += `${letter}${x + this.x} ${y + this.y}`;
   }
   lineTo(x, y) {
-    this.moveTo(x, y, "L");
+    this.moveTo(x, y, this.d ? "L" : "M");
   }
   closePath() {
     this.d += "Z";
@@ -79,56 +84,38 @@ class Drawing extends /** @type {any} */ (Object) {
   }
   text(text, x, y, look) {
     const anchor = { center: "middle", right: "end" }[this.textAlign] ?? "start";
-    this.add("text", { x: x + this.x, y: y + this.y, "text-anchor": anchor, ...look }, new Text(text));
+    this.add("text", { x: x + this.x, y: y + this.y, "text-anchor": anchor, ...look }, text);
     this.items.at(-1).style.font = this.font;
   }
   pen() {
-    const ends = { "stroke-linecap": this.lineCap ?? "butt", "stroke-linejoin": this.lineJoin ?? "miter" };
-    return {
-      fill: "none",
-      stroke: this.strokeStyle,
-      "stroke-width": this.lineWidth,
-      "stroke-dasharray": this.dash,
-      ...ends,
-    };
+    const ends = { "stroke-linecap": this.lineCap, "stroke-linejoin": this.lineJoin };
+    const line = { stroke: this.strokeStyle, "stroke-width": this.lineWidth, "stroke-dasharray": this.dash };
+    return { fill: "none", ...line, ...ends };
   }
   add(tag, look, ...inside) {
     this.items.push(svg(tag, { opacity: this.globalAlpha, ...look }, ...inside));
   }
 }
 
-/** @param {HTMLCanvasElement} canvas @param {string} name @returns {SVGElement} */
 function drawn(canvas, name) {
-  const { clientWidth: width, clientHeight: height } = canvas;
-  let drawing;
-  paintOnPaper(canvas, ({ context }) => {
-    drawing = new Drawing(context);
-    return drawing;
-  });
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight + HEAD];
+  const { items } = paintOnPaper(canvas, (screen) => new Drawing(screen));
+  const look = { "font-family": "system-ui,sans-serif", "font-size": 18, "font-weight": 600 };
   return svg(
     "svg",
-    {
-      xmlns: "http://www.w3.org/2000/svg",
-      width,
-      height: height + HEAD,
-      viewBox: `0 ${-HEAD} ${width} ${height + HEAD}`,
-    },
-    svg("title", {}, new Text(name)),
-    svg("rect", { y: -HEAD, width, height: height + HEAD, fill: "#fff" }),
-    svg(
-      "text",
-      { x: 16, y: -12, "font-family": "system-ui,sans-serif", "font-size": 18, "font-weight": 600 },
-      new Text(name),
-    ),
-    ...drawing.items,
+    { xmlns: "http://www.w3.org/2000/svg", width, height, viewBox: `0 ${-HEAD} ${width} ${height}` },
+    svg("title", {}, name),
+    svg("rect", { y: -HEAD, width, height, fill: "#fff" }),
+    svg("text", { x: 16, y: -12, ...look }, name),
+    ...items,
   );
 }
 
-/** @param {string} canvas Its id. @param {string} kind svg or png */
-async function save(canvas, kind) {
-  const shown = byId(NAMES[canvas]).textContent.trim();
+/** Save a canvas, by its id, as svg or png, with the name that an element says. */
+async function save(canvas, naming, kind) {
+  const shown = byId(naming).textContent.trim();
   const name = /\p{L}|\p{N}/u.test(shown) ? shown : "Drawing";
-  const picture = drawn(/** @type {any} */ (byId(canvas)), name);
+  const picture = drawn(byId(canvas), name);
   let href = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(picture))}`;
   if (kind === "png") {
     const image = make("img", { src: href });
@@ -140,22 +127,12 @@ async function save(canvas, kind) {
   make("a", { href, download: `${name}.${kind}` }).click();
 }
 
-/** A control below each picture. */
+/** Listen to the control of each picture. */
 export function startSaving() {
-  for (const canvas of Object.keys(NAMES)) {
-    const menu = make("details", { class: "saving" }, make("summary", { class: "button quiet" }, "Save picture"));
-    const act = (kind) => () => {
-      menu.open = false;
-      save(canvas, kind);
-    };
-    for (const kind of ["svg", "png"])
-      menu.append(make("button", { class: "button", type: "button", on: { click: act(kind) } }, kind.toUpperCase()));
-    const stage = byId(canvas).closest(".stage");
-    const row =
-      canvas === "move-canvas" // where many controls are
-        ? byId("move-advanced")
-        : stage.parentElement.querySelector(":scope > .stage ~ .row:not(.nowrap)");
-    if (row) row.append(menu);
-    else stage.after(menu);
-  }
+  for (const menu of document.querySelectorAll(".saving"))
+    for (const choice of menu.querySelectorAll("button"))
+      choice.onclick = () => {
+        menu.removeAttribute("open");
+        save(menu.dataset.picture, menu.dataset.name, choice.textContent.toLowerCase());
+      };
 }

@@ -7,7 +7,7 @@ export class Sending {
   /** @param {(message: Object) => boolean} send */
   constructor(send) {
     this.send = send;
-    /** @type {number[][]} The movement that has no answer yet: a connection that comes back knows nothing of it. */
+    /** The movement that has no answer yet: a connection that comes back knows nothing of it. */
     this.movement = [];
     this.sent = 0; // samples of it
     this.sentAt = 0;
@@ -25,13 +25,12 @@ export class Sending {
     this.send({ reset: true });
   }
 
-  /** @param {number[][]} samples */
   push(samples) {
     this.movement.push(...samples);
     this.go();
   }
 
-  /** The movement is over. @returns {boolean} Whether the server hears it. */
+  /** The movement is over. @returns Whether the server hears it. */
   finish() {
     this.ended = true;
     return this.go();
@@ -53,7 +52,7 @@ export class Sending {
     return this.finishing;
   }
 
-  /** An answer to a movement that has ended came. @returns {boolean} Whether it is about the movement of now. */
+  /** An answer to a movement that has ended came. @returns Whether it is about the movement of now. */
   answered() {
     this.finishes = Math.max(this.finishes - 1, 0);
     const wanted = this.finishing && this.finishes === 0;
@@ -61,7 +60,7 @@ export class Sending {
     return wanted;
   }
 
-  /** An answer to samples came. @returns {boolean} Whether it is about the movement of now. */
+  /** An answer to samples came. @returns Whether it is about the movement of now. */
   heard() {
     const wanted = !this.stale;
     this.open = this.stale = false; // messages that waited together are answered together

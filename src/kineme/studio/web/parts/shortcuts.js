@@ -3,7 +3,7 @@ import { undo } from "./changes.js";
 import { byId } from "./elements.js";
 import { currentView, show, VIEWS } from "./views.js";
 
-/** Whether a key is for a field in which one writes. @param {any} target */
+/** Whether a key is for a field in which one writes. */
 const writes = (target) =>
   target.closest?.("input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]");
 
@@ -12,22 +12,22 @@ function list() {
   byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
-/** With Ctrl, other than in a field in which one writes. @param {KeyboardEvent} event @param {string} keys */
+/** Whether a key is for something else: a field, or a dialog. */
+const isTaken = ({ target }) => writes(target) || document.querySelector("dialog[open]");
+
 const commands = (event, keys) =>
   (event.ctrlKey || event.metaKey) &&
   keys.split(" ").includes((event.shiftKey ? "Shift+" : "") + event.key.toLowerCase()) &&
-  !writes(event.target) &&
-  !document.querySelector("dialog[open]");
+  !isTaken(event);
 
-/** Whether a key takes back. @param {KeyboardEvent} event */
+/** Whether a key takes back. */
 export const isUndo = (event) => commands(event, "z");
 
-/** Whether a key does again. @param {KeyboardEvent} event */
+/** Whether a key does again. */
 export const isRedo = (event) => commands(event, "Shift+z y");
 
-/** @param {KeyboardEvent} event */
 function pressed(event) {
-  if (writes(event.target) || document.querySelector("dialog[open]")) return;
+  if (isTaken(event)) return;
   if (isUndo(event)) {
     event.preventDefault();
     if (!["move", "recordings"].includes(currentView())) undo();
@@ -40,6 +40,6 @@ function pressed(event) {
 
 export function startShortcuts() {
   document.addEventListener("keydown", pressed);
-  byId("help").addEventListener("click", list);
-  byId("undo").addEventListener("click", () => undo());
+  byId("help").onclick = list;
+  byId("undo").onclick = () => undo();
 }

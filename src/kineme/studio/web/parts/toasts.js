@@ -4,45 +4,34 @@ import { button, byId, make } from "./elements.js";
 
 const STAYS = 7000; // [ms]
 
-/**
- * @param {string} text @param {{act?: () => void, action?: string, failed?: boolean}} options
- * @returns {() => void} Takes the message away.
- */
-export function say(text, { act, action, failed = false } = {}) {
-  const toast = make(
-    "div",
-    { class: failed ? "toast failed" : "toast", role: failed ? "alert" : null },
-    make("p", {}, text),
-  );
+/** Say something, with a button that takes it back or closes it. @returns What takes the message away. */
+export function say(text, { undo = null, failed = false } = {}) {
   const close = () => toast.remove();
-  const takeBack = () => {
+  const act = () => {
     close();
-    act();
+    undo?.();
   };
-  toast.append(act ? button(action ?? "Undo", takeBack) : button("Close", close));
+  const look = failed ? { class: "toast failed", role: "alert" } : "toast";
+  const toast = make("div", look, make("p", {}, text), button(undo ? "Undo" : "Close", act));
   byId("toasts").append(toast);
   while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();
   let timer = setTimeout(close, failed ? 2 * STAYS : STAYS);
-  toast.addEventListener("pointerenter", () => clearTimeout(timer));
-  toast.addEventListener("focusin", () => clearTimeout(timer));
-  toast.addEventListener("pointerleave", () => {
-    timer = setTimeout(close, STAYS);
-  });
+  for (const event of ["pointerenter", "focusin"]) toast.addEventListener(event, () => clearTimeout(timer));
+  toast.addEventListener("pointerleave", () => (timer = setTimeout(close, STAYS)));
   return close;
 }
 
-/** Run something and show what goes wrong. @template T @param {() => Promise<T>} act @returns {Promise<T|undefined>} */
-export async function tried(act) {
+/** Show what goes wrong. @template T @param {Promise<T>} answer @returns {Promise<T|undefined>} */
+export async function tried(answer) {
   try {
-    return await act();
+    return await answer;
   } catch (error) {
     if (error.name !== "AbortError") say(error.message, { failed: true });
-    return undefined;
   }
 }
 
-/** Ask for a file, and say under which name it is saved. @param {string} path @param {any} body @param {string} name */
+/** Ask for a file, and say under which name it is saved. */
 export async function save(path, body, name) {
-  const saved = await tried(() => download(path, body, name));
+  const saved = await tried(download(path, body, name));
   if (saved) say(`Saved as ${saved}.`);
 }

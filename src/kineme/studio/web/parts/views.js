@@ -1,21 +1,22 @@
 // Five views, one shown: tabs, arrow keys between them, the address names the view.
 import { byId } from "./elements.js";
+import { onLibrary } from "./library_state.js";
 
 export const VIEWS = ["draw", "library", "move", "recordings", "robot"];
 
-/** @type {Record<string, () => void>} What a view does when it is shown. */
-const shown = {};
+const shown = {}; // what a view does then
 let current = "";
 
-/** @param {string} view @param {() => void} act */
+/** Do something when a view is shown, and when the library changes meanwhile. */
 export function onShow(view, act) {
   shown[view] = act;
+  onLibrary(() => current === view && act());
 }
 
 /** The view that is shown. */
 export const currentView = () => current;
 
-/** @param {string} view @param {boolean} focus Whether its tab gets the focus. */
+/** Show a view; its tab may get the focus. */
 export function show(view, focus = false) {
   if (!VIEWS.includes(view)) return;
   for (const name of VIEWS) {
@@ -26,15 +27,12 @@ export function show(view, focus = false) {
   if (focus) byId(`tab-${view}`).focus();
   if (location.hash !== `#${view}`) history.replaceState(null, "", `#${view}`);
   document.title = `${byId(`tab-${view}`).textContent.trim()} – kineme studio`;
-  const changed = current !== view;
+  if (current === view) return;
   current = view;
-  if (changed) {
-    window.scrollTo(0, 0);
-    shown[view]?.();
-  }
+  window.scrollTo(0, 0);
+  shown[view]?.();
 }
 
-/** @param {KeyboardEvent} event */
 function step(event) {
   const at = VIEWS.indexOf(current);
   const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: VIEWS.length - 1 }[event.key];
@@ -44,10 +42,9 @@ function step(event) {
 }
 
 export function startViews() {
-  for (const view of VIEWS) byId(`tab-${view}`).addEventListener("click", () => show(view));
+  for (const view of VIEWS) byId(`tab-${view}`).onclick = () => show(view);
   document.querySelector(".tabs").addEventListener("keydown", step);
-  for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-view]")))
-    button.addEventListener("click", () => show(button.dataset.view, true));
+  for (const button of document.querySelectorAll("[data-view]")) button.onclick = () => show(button.dataset.view, true);
   window.addEventListener("hashchange", () => show(location.hash.slice(1)));
   show(VIEWS.includes(location.hash.slice(1)) ? location.hash.slice(1) : "draw");
 }

@@ -4,17 +4,12 @@ import { byId, counted } from "../parts/elements.js";
 import { currentView, show } from "../parts/views.js";
 import { askHow } from "./importing.js";
 
-/** @param {string} text @param {boolean} [wrong] */
 function state(text, wrong = false) {
   byId("drop-state").textContent = text;
   byId("drop-state").classList.toggle("went-wrong", wrong);
 }
 
-/**
- * @param {File} file
- * @param {AbortSignal} signal
- * @returns {Promise<any>} What the server read, as the person says; undefined where it did not.
- */
+/** What the server read, as the person says; undefined where it did not. */
 async function send(file, signal) {
   state(`Reading ${file.name} …`);
   const headers = { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" };
@@ -31,30 +26,28 @@ async function send(file, signal) {
   }
 }
 
-/** @param {(recording: any, name: string) => void} read @param {(file: File) => boolean} film Takes a video. */
-export function startDropping(read, film) {
+/** A file that was read is opened; a video is added to what is. @param {import("./view.js").Recordings} page */
+export function startDropping(page) {
   let sending = new AbortController();
-  const take = async (/** @type {FileList|undefined} */ files) => {
+  const take = async (files) => {
     const file = files?.[0];
-    if (!file || (file.type.startsWith("video/") && film(file))) return;
+    if (!file || (page.read && file.type.startsWith("video/") && page.player.add(file))) return;
     sending.abort(); // only the last file is wanted
     sending = new AbortController();
     const recording = await send(file, sending.signal);
     if (!recording) return;
-    read(recording, file.name);
+    page.open(recording, file.name);
     const others = files.length - 1;
     if (others) state(`One file at a time: ${file.name} is shown, ${counted(others, "other")} not read.`);
   };
-  byId("file").addEventListener("change", (/** @type {any} */ event) =>
-    take(event.target.files).finally(() => (event.target.value = "")),
-  );
-  const over = (/** @type {DragEvent} */ event) => {
+  byId("file").onchange = () => take(byId("file").files).finally(() => (byId("file").value = ""));
+  const over = (event) => {
     if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault(); // else the browser leaves the studio for the file
     byId("drop").classList.toggle("over", event.type === "dragover");
     if (event.type === "dragover" && currentView() !== "recordings") show("recordings");
   };
-  for (const name of ["dragover", "dragleave"]) document.addEventListener(name, /** @type {any} */ (over));
+  for (const name of ["dragover", "dragleave"]) document.addEventListener(name, over);
   document.addEventListener("drop", (event) => {
     over(event);
     if (event.dataTransfer?.files.length) take(event.dataTransfer.files);

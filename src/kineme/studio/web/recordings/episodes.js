@@ -1,63 +1,52 @@
 // The episodes of what the studio was started with: a page of strips at a time, symbols found in them, corrections.
-import { get, post } from "../parts/api.js";
+import { get, path, post } from "../parts/api.js";
 import { ask } from "../parts/dialogs.js";
 import { byId, counted, fill, write } from "../parts/elements.js";
-import { onLibrary } from "../parts/library_state.js";
+import { library, onLibrary } from "../parts/library_state.js";
 import { say, tried } from "../parts/toasts.js";
 import { onShow } from "../parts/views.js";
+import { fitting } from "./fitting.js";
 import { plain } from "./spans.js";
 import { Strip } from "./strip.js";
 
 const PAGE = 20; // episodes
 
-const of = (/** @type {string} */ key) => `/api/episodes/${encodeURIComponent(key)}`;
-
 export class Episodes {
-  /**
-   * @param {{open: (detail: any) => void, channels: (detail: any) => string[],
-   *   spotted: (key: string, spans: any[]) => void}} page
-   */
+  /** @param {import("./view.js").Recordings} page */
   constructor(page) {
     this.page = page;
     this.offset = 0;
-    /** @type {any} The answer that is shown. */
-    this.answer = null;
+    this.answer = null; // that is shown
     this.saved = true;
-    /** @type {string|null} Key of the episode that is open. */
-    this.opened = null;
-    /** @type {string[]|null} Channels in which movements are looked for. */
-    this.channels = null;
-    /** @type {Promise<any>} What is sent of spans, one after the other. */
-    this.sending = Promise.resolve();
-    /** @type {AbortController|null} Of the search of a page that is under way. */
-    this.search = null;
+    this.opened = null; // key of the episode that is open
+    this.channels = null; // in which movements are looked for
+    this.sending = Promise.resolve(); // of spans, one after the other
+    this.search = null; // of a page that is under way
     /** @type {Strip[]} */
     this.strips = [];
-    const turn = (/** @type {number} */ offset) => tried(() => this.turn(offset));
+    const turn = (offset) => tried(this.turn(offset));
     onShow("recordings", () => this.answer || turn(0));
-    byId("episodes-before").addEventListener("click", () => turn(this.offset - PAGE));
-    byId("episodes-next").addEventListener("click", () => turn(this.offset + PAGE));
-    byId("episodes-from").addEventListener("change", () => turn((byId("episodes-from").valueAsNumber || 1) - 1));
-    byId("spot-page").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
-    byId("save-corrections").addEventListener("click", () => tried(() => this.save()));
-    byId("strips").addEventListener("keydown", (event) => this.key(event));
+    byId("episodes-before").onclick = () => turn(this.offset - PAGE);
+    byId("episodes-next").onclick = () => turn(this.offset + PAGE);
+    byId("episodes-from").onchange = () => turn((byId("episodes-from").valueAsNumber || 1) - 1);
+    byId("spot-page").onclick = () => (this.search ? this.search.abort() : this.spot());
+    byId("save-corrections").onclick = () => tried(this.save());
+    byId("strips").onkeydown = (event) => this.key(event);
     onLibrary(() => {
       this.channels = null; // it may hold others now
       for (const strip of this.strips) strip.recolor();
     });
   }
 
-  /** Show the episodes from one on. @param {number} offset */
+  /** Show the episodes from one on. */
   async turn(offset) {
     this.search?.abort();
     await this.sending;
     const answer = await get(`/api/episodes?offset=${Math.max(Math.floor(offset), 0)}&limit=${PAGE}`);
-    if (answer.name === null) {
-      this.answer = answer;
-      return;
-    }
-    if (!answer.episodes.length && answer.total) return this.turn(Math.floor((answer.total - 1) / PAGE) * PAGE);
+    const beyond = answer.name !== null && !answer.episodes.length && answer.total;
+    if (beyond) return this.turn(Math.floor((answer.total - 1) / PAGE) * PAGE);
     this.answer = answer;
+    if (answer.name === null) return;
     this.offset = answer.offset;
     this.saved = answer.saved;
     byId("download-corrections").hidden = !answer.n_corrected;
@@ -93,29 +82,25 @@ export class Episodes {
       button.setAttribute("aria-current", String(episode?.key === this.opened));
   }
 
-  /** @param {Strip} strip */
   async open(strip) {
     await this.sending;
-    const detail = await tried(() => get(`${of(strip.episode.key)}?width=${Math.round(window.innerWidth)}`));
+    const detail = await tried(get(path`/api/episodes/${strip.episode.key}?width=${Math.round(window.innerWidth)}`));
     if (!detail) return;
     this.opened = detail.recording;
     this.mark();
-    for (const video of detail.videos)
-      video.address = `${of(detail.recording)}/videos/${encodeURIComponent(video.camera)}`;
-    this.page.open(detail);
+    for (const video of detail.videos) video.address = path`/api/episodes/${detail.recording}/videos/${video.camera}`;
+    const { number, task, place } = detail.episode;
+    this.page.open(detail, `Episode ${number}: ${task ?? place}`);
   }
 
-  /**
-   * Keep what an episode shows.
-   * @param {string} key @param {any[]} spans @param {boolean} corrected Whether a person has changed any.
-   */
+  /** Keep what an episode shows, and whether a person has corrected any. */
   put(key, spans, corrected) {
     const body = { spans: plain(spans), corrected };
     if (corrected) {
       this.saved = false;
       byId("download-corrections").hidden = false;
     }
-    this.sending = this.sending.then(() => tried(() => post(`${of(key)}/spans`, body)));
+    this.sending = this.sending.then(() => tried(post(path`/api/episodes/${key}/spans`, body)));
     const strip = this.strips.find(({ episode }) => episode?.key === key);
     if (strip) {
       Object.assign(strip.episode, body);
@@ -132,8 +117,7 @@ export class Episodes {
     this.search = search;
     const strips = this.strips.filter(({ episode }) => episode?.n_samples && !episode.corrected);
     let done = 0;
-    /** @type {string[]} Why others could not be. */
-    const refused = [];
+    const refused = []; // why others could not be
     this.say();
     try {
       for (const { episode } of strips) {
@@ -144,7 +128,7 @@ export class Episodes {
         });
         if (!spans) continue;
         await this.put(episode.key, spans, false);
-        this.page.spotted(episode.key, spans);
+        if (this.page.read?.recording === episode.key) this.page.spotted(spans);
         done += 1;
       }
       write(byId("episodes-state"), `Looked through ${counted(done, "episode")}.`);
@@ -159,11 +143,13 @@ export class Episodes {
     }
   }
 
-  /** What happens when in an episode. @param {string} key @param {AbortSignal} signal @returns {Promise<any[]>} */
+  /** What happens when in an episode. */
   async find(key, signal) {
-    this.channels ??= this.page.channels(await get(of(key)));
-    const path = `/api/recordings/${encodeURIComponent(key)}/spotted`;
-    return (await post(path, { channels: this.channels }, signal)).spans;
+    if (!this.channels) {
+      const { tables, chosen } = await get(path`/api/episodes/${key}`);
+      this.channels = [...fitting(tables[0].channels, library(), chosen)];
+    }
+    return (await post(path`/api/recordings/${key}/spotted`, { channels: this.channels }, signal)).spans;
   }
 
   /** Write the table of corrections beside what was opened. */
@@ -181,7 +167,7 @@ export class Episodes {
     }
   }
 
-  /** Arrow keys go from strip to strip. @param {KeyboardEvent} event */
+  /** Arrow keys go from strip to strip. */
   key(event) {
     const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
     const at = this.strips.findIndex(({ button }) => button === event.target);

@@ -2,43 +2,25 @@
 import { post } from "../parts/api.js";
 import { byId, fill, make } from "../parts/elements.js";
 
-/**
- * Ask how a table is read, and read it so.
- * @param {any} sent What the server says of the file.
- * @param {string} name
- * @returns {Promise<any>} The recording; null if the person gave up.
- */
+/** Ask how a table is read, and read it so: the recording; null if the person gave up. @returns {Promise<any>} */
 export function askHow({ recording, preview, unclear }, name) {
   const [dialog, table] = [byId("importing"), byId("importing-rows")];
-  const form = /** @type {HTMLFormElement} */ (dialog.firstElementChild);
+  const form = dialog.querySelector("form");
   form.reset();
-  /** @type {string[]} */
-  const heads = preview.heads;
-  /** @type {(head: string, cells: any[]) => HTMLTableRowElement} */
+  const { heads } = preview;
   const row = (head, cells) =>
     make("tr", {}, make("th", { scope: "row" }, head), ...cells.map((cell) => make("td", {}, cell)));
-  /** @type {(type: string, name: string, chosen: string[], value: string, k?: number) => HTMLElement} */
-  const box = (type, name, chosen, value, k) => {
-    const disabled = preview.numbers[k] === false;
-    return make("input", {
-      type,
-      name,
-      value,
-      disabled,
-      checked: chosen.includes(value),
-      "aria-label": `${name} ${value}`,
-    });
+  const box = (type, name, chosen) => (value, k) => {
+    const state = { checked: chosen.includes(value), disabled: preview.numbers[k] === false };
+    return make("input", { type, name, value, ...state, "aria-label": `${name} ${value}` });
   };
-  const time = preview.time ?? "";
-  const times = row(
-    "Time",
-    heads.map((head, k) => box("radio", "time", [time], head, k)),
-  );
-  times.cells[0].append(make("label", { class: "soft" }, " ", box("radio", "time", [time], ""), " none"));
-  const columns = heads.map((head, k) => box("checkbox", "columns", preview.columns, head, k));
+  const time = box("radio", "time", [preview.time ?? ""]);
+  const times = row("Time", heads.map(time));
+  times.cells[0].append(make("label", "soft", " ", time("", -1), " none"));
+  const columns = row("Coordinates", heads.map(box("checkbox", "columns", preview.columns)));
+  const rows = preview.rows.map((cells, k) => row(`Row ${k + 1}`, cells));
   fill(table.tHead, row("Column", heads));
-  fill(table.tBodies[0], times, row("Coordinates", columns));
-  for (const [k, cells] of preview.rows.entries()) table.tBodies[0].append(row(`Row ${k + 1}`, cells));
+  fill(table.tBodies[0], times, columns, ...rows);
   /** @type {any} */
   const fields = form.elements;
   for (const key of ["units", "rate"]) fields[key].value = preview[key] ?? "";
@@ -49,7 +31,7 @@ export function askHow({ recording, preview, unclear }, name) {
   if (!dialog.open) dialog.showModal();
   return new Promise((done) => {
     form.onsubmit = async (event) => {
-      if (!(/** @type {any} */ (event.submitter).value)) return;
+      if (event.submitter.matches("[value='']")) return;
       event.preventDefault();
       const data = new FormData(form);
       const said = Object.fromEntries([...data].filter(([, value]) => value));

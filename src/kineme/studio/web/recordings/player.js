@@ -1,40 +1,38 @@
 // The playhead of a recording: played, stepped through, with the video of a camera beside it where there is one.
 import { byId, offer, write } from "../parts/elements.js";
+import { clamp } from "../parts/geometry.js";
 
 const STEP = 0.1; // of an arrow key [s]; ten times as much with Shift
 const NEAR = 0.05; // a video that is so near the playhead stays where it is [s]
 
-/** @typedef {{camera: string, start: number, codec: string|null, address: string, own?: boolean}} Video */
-
 export class Player {
-  /** @param {(time: number) => void} moved */
   constructor(moved) {
     this.moved = moved;
     this.at = 0;
     this.end = 0;
     this.playing = false;
     this.last = 0; // when the playhead was moved last [ms]
-    /** @type {Video[]} */
     this.videos = [];
     /** @type {Video|null} The one that is shown, unless the browser cannot play it. */
     this.video = null;
     this.film = byId("video");
-    this.film.addEventListener("error", () => this.fail());
-    this.film.addEventListener("loadedmetadata", () => (this.film.videoWidth ? this.follow() : this.fail()));
-    byId("video-start").addEventListener("input", () => {
+    this.film.onerror = () => this.fail();
+    this.film.onloadedmetadata = () => (this.film.videoWidth ? this.follow() : this.fail());
+    byId("video-start").oninput = () => {
       if (this.video) this.video.start = byId("video-start").valueAsNumber || 0;
       this.follow();
-    });
-    byId("own-video").addEventListener("change", (/** @type {any} */ event) => {
-      if (event.target.files.length) this.add(event.target.files[0]);
-    });
-    byId("camera").addEventListener("change", () => this.show(Number(byId("camera").value)));
-    byId("play-recording").addEventListener("click", () => this.toggle());
-    byId("playhead").addEventListener("input", () => this.seek(byId("playhead").valueAsNumber));
-    byId("playhead").addEventListener("keydown", (event) => this.key(event));
+    };
+    byId("own-video").onchange = () => {
+      const [file] = byId("own-video").files;
+      if (file) this.add(file);
+    };
+    byId("camera").onchange = () => this.show(byId("camera").selectedIndex);
+    byId("play-recording").onclick = () => this.toggle();
+    byId("playhead").oninput = () => this.seek(byId("playhead").valueAsNumber);
+    byId("playhead").onkeydown = (event) => this.key(event);
   }
 
-  /** Another recording. @param {number} end [s] @param {Video[]} videos */
+  /** Another recording. @param {Video[]} videos */
   open(end, videos) {
     this.pause();
     Object.assign(this, { end, videos });
@@ -43,26 +41,24 @@ export class Player {
     this.seek(0);
   }
 
-  /** A video of the person's, which stays in the browser. @param {File} file */
+  /** A video of the person's, which stays in the browser. */
   add(file) {
     this.videos.push({ camera: file.name, start: 0, codec: null, address: URL.createObjectURL(file), own: true });
     this.list(this.videos.length - 1);
     return true;
   }
 
-  /** Offer all videos, and show one. @param {number} k */
+  /** Offer all videos, and show one. */
   list(k) {
     byId("video-part").hidden = !this.videos.length;
     byId("camera-part").hidden = this.videos.length < 2;
-    offer(
-      byId("camera"),
-      this.videos.map(({ camera }) => camera),
-    );
-    byId("camera").value = String(k);
+    const cameras = this.videos.map(({ camera }) => camera);
+    offer(byId("camera"), cameras);
+    byId("camera").selectedIndex = k;
     this.show(k);
   }
 
-  /** The video of a camera. @param {number} k */
+  /** The video of a camera. */
   show(k) {
     this.video = this.videos[k] ?? null;
     this.film.hidden = !this.video;
@@ -81,10 +77,8 @@ export class Player {
   fail() {
     if (!this.video) return;
     const { camera, codec } = this.video;
-    write(
-      byId("video-note"),
-      `This browser cannot play the video of ${camera}${codec ? ` (${codec})` : ""}. The signals go on without it.`,
-    );
+    const name = codec ? `${camera} (${codec})` : camera;
+    write(byId("video-note"), `This browser cannot play the video of ${name}. The signals go on without it.`);
     this.video = null;
     this.film.hidden = true;
   }
@@ -120,30 +114,28 @@ export class Player {
       this.follow();
       this.film.play().catch(() => {}); // an error of the video says more
     }
-    const time =
-      due && !this.film.paused ? this.film.currentTime - this.video.start : this.at + (now - this.last) / 1000;
+    if (due && !this.film.paused) this.go(this.film.currentTime - this.video.start);
+    else this.go(this.at + (now - this.last) / 1000);
     this.last = now;
-    this.go(time);
     if (this.at >= this.end) this.pause();
     else requestAnimationFrame(() => this.tick());
   }
 
-  /** @param {number} time [s] */
+  /** Put the playhead at a time [s], and the video with it. */
   seek(time) {
     this.go(time);
     this.follow();
   }
 
-  /** @param {number} time [s] */
   go(time) {
-    this.at = Math.min(Math.max(time, 0), this.end);
+    this.at = clamp(time, 0, this.end);
     byId("playhead").value = String(this.at);
     byId("playhead").setAttribute("aria-valuetext", `${this.at.toFixed(2)} seconds`);
     write(byId("playhead-text"), `${this.at.toFixed(2)} of ${this.end.toFixed(2)} s`);
     this.moved(this.at);
   }
 
-  /** Space plays and pauses, arrow keys step. @param {KeyboardEvent} event */
+  /** Space plays and pauses, arrow keys step. */
   key(event) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (event.key === " ") this.toggle();

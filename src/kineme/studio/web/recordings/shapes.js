@@ -5,12 +5,7 @@ import { line, mark } from "../parts/lines.js";
 import { flattened } from "../parts/thumbnails.js";
 import { colorOf } from "./strip.js";
 
-/** @typedef {{times: number[], path: number[][], flat?: number[][]}} Shape */
-
-/**
- * A path in pixels: its middle is at a point, and it fits into a square.
- * @param {Shape} shape @param {number[]} middle @param {number} side
- */
+/** A path in pixels: its middle is at a point, and it fits into a square. @param {Shape} shape @param {number[]} at */
 export function placed(shape, [x, y], side) {
   shape.flat ??= flattened(shape.path);
   return shape.flat.map(([a, b]) => [x + (side / 100) * (a - 50), y + (side / 100) * (b - 50)]);
@@ -26,7 +21,6 @@ export class ShapeView {
     this.board = new Board(byId("shape"), () => this.paint());
   }
 
-  /** @param {number} head [s] @param {any} span @param {Shape|undefined} shape */
   show(head, span, shape) {
     Object.assign(this, { head, span, shape });
     this.board.draw();
@@ -43,6 +37,6 @@ export class ShapeView {
     const paint = label === undefined ? color("--soft") : colorOf(label);
     line(context, points, { color: paint, width: 2, alpha: 0.4 });
     line(context, done, { color: paint, width: 4 });
-    mark(context, done[done.length - 1], "dot", 7, color("--text"));
+    mark(context, done.at(-1), "dot", 7, color("--text"));
   }
 }

@@ -3,45 +3,34 @@ import { button, byId, fill, keepingFocus, make } from "../parts/elements.js";
 
 export const BY_HAND = { p: null, confidence: null, certainty: null }; // they were of what was found
 
-/** What the server is told of spans. @param {any[]} spans */
+/** What the server is told of spans. */
 export const plain = (spans) =>
   spans.map(({ begin, end, label, p = null, confidence = null }) => ({ begin, end, label, p, confidence }));
 
-/**
- * @param {any[]} spans
- * @param {number} chosen
- * @param {{choose: (k: number) => void, changed: () => void, remove: (k: number) => void}} page
- */
+/** @param {TimelinePage} page */
 export function showSpans(spans, chosen, page) {
-  const row = (/** @type {any} */ span, /** @type {number} */ k) => {
-    /** @type {(which: "begin"|"end"|"label", words: string, options: any) => HTMLElement} */
+  const row = (span, k) => {
+    const onfocus = () => page.choose(k);
     const field = (which, words, options) => {
-      const input = make("input", {
-        "aria-label": `${words} of span ${k + 1}`,
-        "data-key": `span ${k} ${which === "label" ? "name" : which}`,
-        on: { focus: () => page.choose(k) },
-        ...options,
-      });
-      const isTime = which !== "label";
-      input.value = isTime ? span[which].toFixed(2) : (span.label ?? "");
-      input.addEventListener("change", () => {
-        const value = isTime ? input.valueAsNumber : input.value.trim() || null;
+      const onchange = ({ target }) => {
+        const value = which === "label" ? target.value.trim() || null : target.valueAsNumber;
         if (!Number.isNaN(value)) Object.assign(span, { [which]: value, ...BY_HAND });
         page.changed();
-      });
-      return make("td", { class: isTime ? null : "wide" }, input);
+      };
+      const name = { "aria-label": `${words} of span ${k + 1}`, "data-key": `span ${k} ${words.toLowerCase()}` };
+      return make("td", which === "label" ? "wide" : {}, make("input", { ...name, ...options, onfocus, onchange }));
     };
-    const time = { type: "number", step: "0.01", readOnly: k !== chosen };
+    const time = (which) => ({ type: "number", step: "0.01", readOnly: k !== chosen, value: span[which].toFixed(2) });
+    const words = { type: "text", list: "names", maxLength: "200", placeholder: "unknown", value: span.label ?? "" };
     const p = Number.isFinite(span.p) ? `p = ${span.p.toFixed(2)}` : "–";
-    const away = button("×", () => page.remove(k), {
-      ...{ class: "button quiet square", "aria-label": `Remove span ${k + 1}`, hidden: k !== chosen },
-    });
+    const look = { class: "button quiet square", "aria-label": `Remove span ${k + 1}`, hidden: k !== chosen };
+    const away = button("×", () => page.remove(k), look);
     return make(
       "tr",
-      { class: k === chosen ? "chosen" : null, on: { click: () => page.choose(k) } },
-      field("begin", "Begin", time),
-      field("end", "End", time),
-      field("label", "Name", { type: "text", list: "names", maxLength: "200", placeholder: "unknown" }),
+      { class: k === chosen ? "chosen" : null, onclick: () => page.choose(k) },
+      field("begin", "Begin", time("begin")),
+      field("end", "End", time("end")),
+      field("label", "Name", words),
       make("td", { title: p }, span.certainty ?? p),
       make("td", {}, away),
     );
@@ -50,13 +39,11 @@ export function showSpans(spans, chosen, page) {
   keepingFocus(() => fill(byId("spans").tBodies[0], ...spans.map(row)));
 }
 
-/** Mark the row of the chosen one; its times can be typed. @param {number} chosen */
+/** Mark the row of the chosen one; its times can be typed. */
 export function markRow(chosen) {
   for (const [k, row] of [...byId("spans").tBodies[0].rows].entries()) {
     row.classList.toggle("chosen", k === chosen);
     for (const part of row.querySelectorAll("button")) part.hidden = k !== chosen;
-    /** @type {NodeListOf<HTMLInputElement>} */
-    const times = row.querySelectorAll("[type=number]");
-    for (const time of times) time.readOnly = k !== chosen;
+    for (const time of row.querySelectorAll("[type=number]")) time.readOnly = k !== chosen;
   }
 }

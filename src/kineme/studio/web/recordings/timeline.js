@@ -1,7 +1,8 @@
 // The recording over time: its columns, the shapes and names of what was found, the edges of the span that is chosen.
 import { Board, color } from "../parts/canvas.js";
 import { drag } from "../parts/dragging.js";
-import { byId, make } from "../parts/elements.js";
+import { byId, keyed, make } from "../parts/elements.js";
+import { clamp } from "../parts/geometry.js";
 import { COLORS } from "../parts/library_state.js";
 import { line } from "../parts/lines.js";
 import { placed } from "./shapes.js";
@@ -15,27 +16,14 @@ const SIDE = 12;
 const AXIS = 26;
 const LEAST = 0.02; // duration of a span [s]
 
-/** @typedef {{begin: number, end: number, label: string|null, p: number|null, confidence?: number|null}} Span */
-
-/**
- * @typedef {Object} Page
- * @property {(k: number) => void} choose
- * @property {() => void} changed By the person.
- * @property {() => void} add
- * @property {(k: number) => void} remove
- * @property {(time: number) => void} seek
- * @property {(event: KeyboardEvent) => void} key For the playhead.
- */
-
 export class Timeline {
-  /** @param {Page} page */
+  /** @param {TimelinePage} page */
   constructor(page) {
     this.page = page;
     this.plot = { times: [0, 1], columns: [] };
     /** @type {Span[]} */
     this.spans = [];
-    /** @type {WeakMap<any, import("./shapes.js").Shape>} */
-    this.shapes = new WeakMap();
+    this.shapes = new WeakMap(); // of spans
     this.chosen = -1;
     this.range = [0, 1];
     this.head = 0; // where the playhead is [s]
@@ -43,18 +31,19 @@ export class Timeline {
     this.board = new Board(canvas, () => this.paint());
     this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
     byId("edges").append(this.playhead);
-    this.edges = ["begin", "end"].map((which) => this.edge(/** @type {"begin"|"end"} */ (which)));
-    canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    canvas.addEventListener("keydown", (event) => this.key(event));
-    canvas.addEventListener("dblclick", () => (this.chosen < 0 ? this.page.add() : this.name()));
-    canvas.tabIndex = 0;
+    this.edges = ["begin", "end"].map((which) => this.edge(which));
+    Object.assign(canvas, {
+      tabIndex: 0,
+      onpointerdown: (event) => this.grab(event),
+      onwheel: (event) => this.wheel(event),
+      onkeydown: (event) => this.key(event),
+      ondblclick: () => (this.chosen < 0 ? this.page.add() : this.name()),
+    });
   }
 
-  /** @param {any} plot */
   show(plot) {
     this.plot = plot;
-    this.extent = [plot.times[0] ?? 0, plot.times[plot.times.length - 1] ?? 1];
+    this.extent = [plot.times[0] ?? 0, plot.times.at(-1) ?? 1];
     this.range = [...this.extent];
     this.chosen = -1;
     this.board.fit();
@@ -66,11 +55,11 @@ export class Timeline {
     return (this.range[1] - this.range[0]) / (this.board.width - 2 * SIDE);
   }
 
-  x(/** @type {number} */ time) {
+  x(time) {
     return SIDE + (time - this.range[0]) / this.scale;
   }
 
-  time(/** @type {number} */ x) {
+  time(x) {
     return this.range[0] + (x - SIDE) * this.scale;
   }
 
@@ -79,8 +68,8 @@ export class Timeline {
     const top = height - BAND - AXIS;
     for (const [k, span] of this.spans.entries()) this.paintSpan(span, k === this.chosen, top);
     paintLanes(context, this.spans, (time) => this.x(time), [top, BAND], this.chosen);
-    const x = this.plot.times.map((/** @type {number} */ time) => this.x(time));
-    for (const [k, column] of /** @type {any[]} */ (this.plot.columns).entries()) {
+    const x = this.plot.times.map((time) => this.x(time));
+    for (const [k, column] of this.plot.columns.entries()) {
       const look = { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.4 };
       signal(context, x, column.values, [8, top - 12 - (this.spans.length ? SHAPE : 0)], look);
     }
@@ -89,7 +78,6 @@ export class Timeline {
     this.goTo(this.head);
   }
 
-  /** @param {Span} span @param {boolean} isChosen @param {number} bottom */
   paintSpan(span, isChosen, bottom) {
     const { context, width } = this.board;
     const [x, paint, shape] = [this.x(span.begin), colorOf(span.label), this.shapes.get(span)];
@@ -116,43 +104,38 @@ export class Timeline {
     context.fillText("s", width - 4, height - 6);
   }
 
-  /** @param {"begin"|"end"} which */
   edge(which) {
-    const button = make("button", {
-      ...{ class: "edge", type: "button", role: "slider", hidden: true, "data-key": `edge ${which}` },
-    });
-    const go = (/** @type {PointerEvent} */ now) =>
-      this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
-    button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+    const look = { class: "edge", type: "button", role: "slider", hidden: true };
+    const go = (now) => this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
+    const onpointerdown = (event) => {
       if (!drag(button, event, go, () => this.page.changed())) return;
       event.preventDefault();
       button.focus({ preventScroll: true });
-    });
-    button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    };
+    const onkeydown = (event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
       if (!step) return this.key(event);
       event.preventDefault();
       const by = (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500;
       this.moveEdge(which, this.spans[this.chosen][which] + by);
       this.page.changed();
-    });
+    };
+    const button = make("button", { ...look, "data-key": `edge ${which}`, onpointerdown, onkeydown });
     byId("edges").append(button);
     return { which, button };
   }
 
-  /** @param {"begin"|"end"} which @param {number} time */
   moveEdge(which, time) {
     const span = this.spans[this.chosen];
     if (!span) return; // another finger has chosen none
-    span[which] =
-      which === "begin"
-        ? Math.min(Math.max(time, this.extent[0]), span.end - LEAST)
-        : Math.max(Math.min(time, this.extent[1]), span.begin + LEAST);
+    const [first, last] = this.extent;
+    if (which === "begin") span.begin = clamp(time, first, span.end - LEAST);
+    else span.end = clamp(time, span.begin + LEAST, last);
     Object.assign(span, BY_HAND);
     this.board.now();
   }
 
-  /** Move the playhead. @param {number} time */
+  /** Move the playhead. */
   goTo(time) {
     this.head = time;
     const x = this.x(time);
@@ -166,21 +149,14 @@ export class Timeline {
       button.hidden = !span || this.x(span[which]) < 0 || this.x(span[which]) > this.board.width;
       if (!span) continue;
       button.style.setProperty("--x", `${this.x(span[which])}px`);
-      const values = {
-        "aria-label": `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`,
-        "aria-valuenow": span[which].toFixed(2),
-        "aria-valuemin": this.extent[0].toFixed(2),
-        "aria-valuemax": this.extent[1].toFixed(2),
-        "aria-valuetext": `${span[which].toFixed(2)} seconds`,
-      };
-      for (const [name, value] of Object.entries(values)) button.setAttribute(name, value);
+      const [now, low, high] = [span[which], ...this.extent].map((time) => time.toFixed(2));
+      Object.assign(button, { ariaValueNow: now, ariaValueMin: low, ariaValueMax: high });
+      button.ariaValueText = `${now} seconds`;
+      button.ariaLabel = `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`;
     }
   }
 
-  /**
-   * A click chooses a span, dragging moves along a recording that is longer than the picture.
-   * @param {PointerEvent} event
-   */
+  /** A click chooses a span, dragging moves along a recording that is longer than the picture. */
   grab(event) {
     const at = this.time(event.offsetX);
     if (!drag(this.board.canvas, event, (now) => this.pan(-now.movementX * this.scale))) return;
@@ -191,22 +167,21 @@ export class Timeline {
     this.page.seek(at);
   }
 
-  pan(/** @type {number} */ by) {
+  pan(by) {
     const length = this.range[1] - this.range[0];
-    const from = Math.min(Math.max(this.range[0] + by, this.extent[0]), this.extent[1] - length);
+    const from = clamp(this.range[0] + by, this.extent[0], this.extent[1] - length);
     this.range = [from, from + length];
     this.board.draw();
   }
 
-  zoom(/** @type {number} */ factor, around = (this.range[0] + this.range[1]) / 2) {
+  zoom(factor, around = (this.range[0] + this.range[1]) / 2) {
     const [[low, high], [from, to]] = [this.extent, this.range];
-    const length = Math.min(Math.max((to - from) * factor, (high - low) / 2000), high - low);
+    const length = clamp((to - from) * factor, (high - low) / 2000, high - low);
     const begin = around - ((around - from) / (to - from)) * length;
     this.range = [begin, begin + length];
     this.pan(0);
   }
 
-  /** @param {WheelEvent} event */
   wheel(event) {
     const isAll = this.range[0] === this.extent[0] && this.range[1] === this.extent[1];
     const isAcross = Math.abs(event.deltaX) > Math.abs(event.deltaY);
@@ -216,12 +191,11 @@ export class Timeline {
     event.preventDefault();
   }
 
-  /** @param {KeyboardEvent} event */
   key(event) {
     const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
     if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1 / 0.7);
-    else if (step) this.page.choose(Math.min(Math.max(this.chosen + step, 0), this.spans.length - 1));
+    else if (step) this.page.choose(clamp(this.chosen + step, 0, this.spans.length - 1));
     else if (event.key === "Enter" && this.chosen >= 0) this.name();
     else if (event.key === "Delete" && this.chosen >= 0) this.page.remove(this.chosen);
     else if (event.key === "Insert") this.page.add();
@@ -231,6 +205,6 @@ export class Timeline {
 
   /** Let the person name the span that is chosen. */
   name() {
-    /** @type {HTMLElement} */ (document.querySelector(`[data-key="span ${this.chosen} name"]`))?.focus();
+    keyed(`span ${this.chosen} name`)?.focus();
   }
 }

@@ -1,11 +1,12 @@
 // Recordings: a file, its channels, what was found in it, corrected, played, saved and learned.
-import { download, get, post } from "../parts/api.js";
+import { get, path, post } from "../parts/api.js";
 import { learnSpans, undo } from "../parts/changes.js";
 import { byId, counted, fill, make, offer } from "../parts/elements.js";
 import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { ask } from "../parts/dialogs.js";
+import { Steps } from "../parts/steps.js";
 import { isRedo, isUndo } from "../parts/shortcuts.js";
-import { tried } from "../parts/toasts.js";
+import { save, tried } from "../parts/toasts.js";
 import { currentView } from "../parts/views.js";
 import { startDropping } from "./dropping.js";
 import { Episodes } from "./episodes.js";
@@ -20,53 +21,33 @@ const SHORT = 10; // a recording of one movement [s]
 const RESTS = 100; // stretches of a recording of which shapes are drawn where there is no annotation
 const ASKED = 400; // how often it is asked how much is searched [ms]
 
-/** @typedef {{name: string, kind: string, unit: string|null, columns: string[]}} Channel */
-/** @typedef {{name: string, channels: Channel[], duration: number, rate: number|null, label: string|null}} Table */
-/**
- * What the server says of a recording.
- * @typedef {{recording: string, tables: Table[], plots: any[], problems: string[], preview: any, command: string,
- *   episode?: any, videos?: any[], chosen?: string[]}} Recording
- */
-
-class Recordings {
+export class Recordings {
   constructor() {
     /** @type {Recording|null} */
     this.read = null;
-    /** @type {AbortController|null} Of the search that is under way. */
-    this.search = null;
-    /** @type {string[]} The spans after each change, the first ones as they were shown. */
-    this.states = [];
-    this.state = 0; // which of them is shown
-    /** @type {any[]} Spans, and what lies between. */
-    this.stretches = [];
+    this.search = null; // that is under way
+    this.steps = new Steps(); // of the spans
+    this.stretches = []; // spans, and what lies between
     this.timeline = new Timeline(this);
     this.shape = new ShapeView();
     this.player = new Player((time) => this.goTo(time));
-    this.episodes = new Episodes({
-      open: (detail) =>
-        this.open(detail, `Episode ${detail.episode.number}: ${detail.episode.task ?? detail.episode.place}`),
-      channels: ({ tables, chosen }) => [...fitting(tables[0].channels, library(), chosen)],
-      spotted: (key, spans) => key === this.read?.recording && this.spotted(spans),
-    });
-    startDropping(
-      (recording, name) => this.open(recording, name),
-      (file) => Boolean(this.read) && this.player.add(file),
-    );
+    this.episodes = new Episodes(this);
+    startDropping(this);
     for (const [id, act] of Object.entries({
       spot: () => (this.search ? this.search.abort() : this.spot()),
       "add-span": () => this.add(),
       "undo-span": () => this.step(-1),
       "redo-span": () => this.step(1),
-      "save-spans": () => tried(() => this.save()),
+      "save-spans": () => this.save(),
       "learn-spans": () => this.learn(),
       "learn-file": () => learnSpans(this.read.recording, { channels: this.chosenChannels() }),
       "read-as": () => this.readAs(),
       "zoom-in": () => this.timeline.zoom(0.6),
       "zoom-out": () => this.timeline.zoom(1 / 0.6),
     }))
-      byId(id).addEventListener("click", act);
-    byId("tables").addEventListener("change", () => this.showTable());
-    byId("channels").addEventListener("change", () => this.columns());
+      byId(id).onclick = act;
+    byId("tables").onchange = () => this.showTable();
+    byId("channels").onchange = () => this.columns();
     document.addEventListener("keydown", (event) => this.takeBack(event));
     onLibrary(() => {
       this.allow();
@@ -74,7 +55,7 @@ class Recordings {
     });
   }
 
-  /** @param {Recording} recording @param {string} name */
+  /** @param {Recording} recording */
   open(recording, name) {
     const { tables, episode } = recording;
     this.read = recording;
@@ -84,16 +65,14 @@ class Recordings {
     byId("recording-name").textContent = name;
     byId("read-as").hidden = !recording.preview;
     byId("shell").textContent = recording.command;
-    offer(
-      byId("tables"),
-      tables.map((table) => table.name),
-    );
+    const names = tables.map((table) => table.name);
+    offer(byId("tables"), names);
     byId("tables-part").hidden = tables.length < 2;
     const labeled = tables.filter((table) => table.label !== null);
     const labels = [...new Set(labeled.map((table) => table.label))].slice(0, 8).join(", ");
     byId("learn-file").hidden = tables.length < 2 || !labeled.length;
     byId("learn-file").title = `${counted(tables.length, "movement")}, ${labeled.length} with a label: ${labels}`;
-    fill(byId("problems"), ...recording.problems.map((problem) => make("p", { class: "small" }, problem)));
+    fill(byId("problems"), ...recording.problems.map((problem) => make("p", "small", problem)));
     this.showTable();
     byId(episode ? "timeline-canvas" : "spot").focus({ preventScroll: true });
     if (episode) byId("recording").scrollIntoView({ block: "start" });
@@ -108,7 +87,7 @@ class Recordings {
 
   /** The table that is chosen. */
   get table() {
-    return this.read.tables[Number(byId("tables").value)];
+    return this.read.tables[byId("tables").selectedIndex];
   }
 
   /** Another table, of this file or of a new one: what is still searched for is about the one before. */
@@ -121,16 +100,16 @@ class Recordings {
       `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
     const chosen = fitting(table.channels, library(), this.read.chosen);
     const boxes = table.channels.map(({ name, kind, unit }, k) => {
-      const key = make("span", { class: "key" });
+      const key = make("span", "key");
       key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
-      const says = make("span", { class: "soft small says" }, [kind, unit].filter(Boolean).join(", "));
+      const says = make("span", "soft small says", [kind, unit].filter(Boolean).join(", "));
       const box = make("input", { type: "checkbox", checked: chosen.has(name), value: name });
-      return make("label", { class: "check" }, box, key, make("span", {}, name, says));
+      return make("label", "check", box, key, make("span", {}, name, says));
     });
     fill(byId("channels"), make("legend", {}, "Channels"), ...boxes);
     const spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
     this.timeline.spans = this.read.episode?.spans ?? spans;
-    this.states = [];
+    this.steps = new Steps();
     this.timeline.show(this.shownPlot());
     this.player.open(table.duration, this.read.videos);
     this.columns();
@@ -138,20 +117,16 @@ class Recordings {
   }
 
   chosenChannels() {
-    /** @type {NodeListOf<HTMLInputElement>} */
-    const boxes = byId("channels").querySelectorAll("input:checked");
-    return [...boxes].map((box) => box.value);
+    return [...byId("channels").querySelectorAll("input:checked")].map((box) => box.value);
   }
 
   /** The plot with the columns of the chosen channels. */
   shownPlot() {
-    const names = new Set(this.chosenChannels());
-    const plot = this.read.plots[this.read.tables.indexOf(this.table)];
-    for (const { name, columns } of this.table.channels) if (names.has(name)) for (const own of columns) names.add(own);
-    /** @type {any[]} */
-    const columns = plot.columns;
-    const colored = columns.map((column, at) => ({ ...column, color: COLORS[at % COLORS.length] }));
-    return { ...plot, columns: colored.filter(({ name }) => names.has(name)) };
+    const names = this.chosenChannels();
+    const shown = this.table.channels.flatMap(({ name, columns }) => (names.includes(name) ? [name, ...columns] : []));
+    const plot = this.read.plots[byId("tables").selectedIndex];
+    const colored = plot.columns.map((column, at) => ({ ...column, color: COLORS[at % COLORS.length] }));
+    return { ...plot, columns: colored.filter(({ name }) => shown.includes(name)) };
   }
 
   columns() {
@@ -171,17 +146,16 @@ class Recordings {
     }));
     const stretches = [...spans, ...rests];
     this.stretches = stretches;
-    const asked = { ...this.body(), spans: stretches.map(({ begin, end }) => ({ begin, end })), points: 100 };
-    /** @type {any[]} */
-    const answer = await post(this.path("shapes"), asked).catch(() => []);
+    const parts = stretches.map(({ begin, end }) => ({ begin, end }));
+    const answer = await post(this.path("shapes"), { ...this.body(), spans: parts, points: 100 }).catch(() => []);
     for (const [k, shape] of answer.entries()) shapes.set(stretches[k], shape);
     this.timeline.board.draw();
     this.goTo(this.player.at);
   }
 
-  /** The address of what is asked about the recording. @param {string} what */
+  /** The address of what is asked about the recording. */
   path(what) {
-    return `/api/recordings/${encodeURIComponent(this.read.recording)}/${what}`;
+    return path`/api/recordings/${this.read.recording}/${what}`;
   }
 
   body() {
@@ -190,19 +164,15 @@ class Recordings {
 
   async spot() {
     const { recording, episode } = this.read;
-    const question = {
-      title: "Look again?",
-      text: "What is found takes the place of what was corrected in this episode.",
-      yes: "Look again",
-    };
-    if (episode?.corrected && !(await ask(question))) return;
-    const path = this.path("spotted");
+    const text = "What is found takes the place of what was corrected in this episode.";
+    if (episode?.corrected && !(await ask({ title: "Look again?", text, yes: "Look again" }))) return;
+    const address = this.path("spotted");
     const search = new AbortController();
     this.search = search;
     this.allow();
     byId("spans-state").textContent = "Looking …";
-    const timer = setInterval(() => this.tell(path, search), ASKED);
-    const answer = await tried(() => post(path, this.body(), search.signal));
+    const timer = setInterval(() => this.tell(address, search), ASKED);
+    const answer = await tried(post(address, this.body(), search.signal));
     clearInterval(timer);
     if (this.search === search) this.over(search.signal.aborted ? "Canceled; nothing was changed." : "");
     if (!answer || search.signal.aborted) return;
@@ -210,7 +180,7 @@ class Recordings {
     this.spotted(answer.spans);
   }
 
-  /** Show what was found. @param {any[]} spans */
+  /** Show what was found. */
   spotted(spans) {
     this.take(spans);
     if (this.read.episode) this.read.episode.corrected = false;
@@ -219,7 +189,7 @@ class Recordings {
     byId("spans-state").textContent = `${counted(named, "known movement")}, ${spans.length - named} unknown.${advice}`;
   }
 
-  /** Show other spans. @param {any[]} spans */
+  /** Show other spans. */
   take(spans) {
     this.timeline.spans = spans;
     if (this.read.episode) this.read.episode.spans = spans;
@@ -228,24 +198,23 @@ class Recordings {
     this.draw();
   }
 
-  /** Take back a change, or make it again. @param {number} by */
+  /** Take back a change, or make it again. */
   step(by) {
-    if (!this.states[this.state + by]) return;
-    this.state += by;
-    this.take(JSON.parse(this.states[this.state]));
+    if (!this.steps.has(by)) return;
+    this.take(this.steps.go(by));
     this.keep();
   }
 
-  /** Ctrl-Z is for the spans; without any change of these, for the library. @param {KeyboardEvent} event */
+  /** Ctrl-Z is for the spans; without any change of these, for the library. */
   takeBack(event) {
     if (currentView() !== "recordings" || event.defaultPrevented) return;
-    if (isUndo(event)) this.state ? this.step(-1) : undo();
+    if (isUndo(event)) this.steps.has(-1) ? this.step(-1) : undo();
     else if (isRedo(event)) this.step(1);
     else return;
     event.preventDefault();
   }
 
-  /** The playhead is elsewhere. @param {number} time */
+  /** The playhead is elsewhere. */
   goTo(time) {
     this.timeline.goTo(time);
     const stretch = this.stretches.find(({ begin, end }) => begin <= time && time <= end);
@@ -255,10 +224,9 @@ class Recordings {
   /** The spans as a file, in a format of the shell. */
   save() {
     const asked = { ...this.body(), spans: plain(this.timeline.spans), format: byId("save-format").value };
-    return download(this.path("annotations"), asked, "annotations");
+    return save(this.path("annotations"), asked, "annotations");
   }
 
-  /** @param {number} k */
   remove(k) {
     this.timeline.spans.splice(k, 1);
     this.choose(-1);
@@ -279,14 +247,13 @@ class Recordings {
     this.episodes.put(this.read.recording, this.timeline.spans, true);
   }
 
-  /** How much is searched. @param {string} path @param {AbortController} search */
-  async tell(path, search) {
-    const progress = await get(path).catch(() => null);
+  /** How much is searched. */
+  async tell(address, search) {
+    const progress = await get(address).catch(() => null);
     if (this.search === search && progress?.share)
       byId("spans-state").textContent = `Looking … ${Math.floor(100 * progress.share)} %`;
   }
 
-  /** @param {string} text */
   over(text) {
     this.search = null;
     this.allow();
@@ -307,7 +274,7 @@ class Recordings {
     this.timeline.name();
   }
 
-  /** @param {number} k -1 for none. */
+  /** Choose a span; -1 for none. */
   choose(k) {
     if (this.timeline.chosen === k) return;
     this.timeline.chosen = k;
@@ -315,21 +282,17 @@ class Recordings {
     markRow(k);
   }
 
-  /** @param {number} time */
   seek(time) {
     this.player.seek(time);
   }
 
-  /** @param {KeyboardEvent} event */
   key(event) {
     this.player.key(event);
   }
 
   show() {
     const { spans, chosen, board } = this.timeline;
-    const now = JSON.stringify(spans);
-    if (!this.states.length) this.state = -1; // of another table
-    if (this.states[this.state] !== now) this.states.splice(++this.state, Infinity, now);
+    this.steps.keep(spans);
     showSpans(spans, chosen, this);
     board.draw();
     this.allow();
@@ -338,31 +301,23 @@ class Recordings {
   allow() {
     if (!this.read) return;
     const { spans } = this.timeline;
-    const names = new Set(this.chosenChannels());
+    const names = this.chosenChannels();
     const { read_only, symbols } = library();
-    const wrong = mismatch(
-      this.table.channels.filter(({ name }) => names.has(name)),
-      library(),
-    );
+    const chosen = this.table.channels.filter(({ name }) => names.includes(name));
+    const wrong = mismatch(chosen, library());
     byId("channels-note").textContent = wrong;
-    byId("undo-span").disabled = !this.state;
-    byId("redo-span").disabled = this.state >= this.states.length - 1;
+    byId("undo-span").disabled = !this.steps.has(-1);
+    byId("redo-span").disabled = !this.steps.has(1);
     byId("save-part").hidden = !spans.length;
     byId("spot").textContent = this.search ? "Cancel" : "Find movements";
     byId("spot").disabled = wrong !== "" && !this.search;
-    byId("learn-file").disabled = read_only || !names.size || (wrong !== "" && symbols.length > 0);
+    byId("learn-file").disabled = read_only || !names.length || (wrong !== "" && symbols.length > 0);
     byId("learn-spans").disabled = read_only || !spans.some((span) => span.label !== null);
   }
 
   async learn() {
-    const spans = this.timeline.spans.filter((span) => span.label !== null);
-    await learnSpans(this.read.recording, {
-      ...this.body(),
-      spans: spans.map(({ begin, end, label }) => ({ begin, end, label })),
-    });
+    const named = this.timeline.spans.filter(({ label }) => label !== null);
+    const spans = named.map(({ begin, end, label }) => ({ begin, end, label }));
+    await learnSpans(this.read.recording, { ...this.body(), spans });
   }
-}
-
-export function startRecordings() {
-  new Recordings();
 }

@@ -2,15 +2,15 @@
 import { byId, fill, make } from "../parts/elements.js";
 import { svg } from "../parts/thumbnails.js";
 
-/** A joint over time between its limits. @param {any} scene @param {any} joint @param {number} k */
+/** A joint over time between its limits. */
 function chart({ times, positions, begins }, { name, low, high }, k) {
-  const values = positions.map((/** @type {number[]} */ row) => row[k]);
+  const values = positions.map((row) => row[k]);
   const limits = [low, high].filter(Number.isFinite);
   const least = Math.min(...values, ...limits);
   const room = Math.max(...values, ...limits) - least || 1;
-  const x = (/** @type {number} */ time) => (300 * time) / (times[times.length - 1] || 1);
-  const y = (/** @type {number} */ value) => 75 - (70 * (value - least)) / room;
-  const place = (/** @type {number} */ value, /** @type {number} */ i) => `${x(times[i])} ${y(value)}`;
+  const x = (time) => (300 * time) / (times.at(-1) || 1);
+  const y = (value) => 75 - (70 * (value - least)) / room;
+  const place = (value, i) => `${x(times[i])} ${y(value)}`;
   const picture = svg(
     "svg",
     { viewBox: "0 0 300 80", preserveAspectRatio: "none", "aria-hidden": "true" },
@@ -20,28 +20,24 @@ function chart({ times, positions, begins }, { name, low, high }, k) {
     svg("line", { class: "cursor", y2: 80 }),
   );
   const title = make("span", { class: "name", title: name }, name);
-  return make(
-    "figure",
-    { class: "chart" },
-    make("figcaption", {}, title, make("output", { "data-unit": "rad" })),
-    picture,
-  );
+  return make("figure", "chart", make("figcaption", {}, title, make("output", { "data-unit": "rad" })), picture);
 }
 
-const viewer = /** @type {any} */ (window).kineme;
+const viewer = window.kineme;
+const tell = (message) => parent.postMessage(message, location.origin);
 const { classList } = document.body;
 classList.toggle("mini", location.search === "?mini");
-if (location.search !== "?mini")
-  viewer.moved = (/** @type {string} */ end, /** @type {number[]} */ point) =>
-    parent.postMessage({ end, point }, location.origin);
+if (location.search !== "?mini") viewer.moved = (end, point) => tell({ end, point });
 
 window.addEventListener("message", ({ origin, source, data: { scene, joints, posture } }) => {
   if (origin !== location.origin || source !== parent) return;
   if (posture) viewer.pose(posture);
   if (!scene) return;
-  fill(byId("charts"), ...joints.map((/** @type {any} */ joint, /** @type {number} */ k) => chart(scene, joint, k)));
+  fill(byId("charts"), ...joints.map((joint, k) => chart(scene, joint, k)));
   viewer.load(scene);
   classList.toggle("rests", scene.times.length < 2);
   if (scene.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches) viewer.play();
 });
-parent.postMessage("ready", location.origin);
+byId("save-picture").onclick = () => make("a", { href: viewer.picture(), download: "arm.png" }).click();
+new ResizeObserver(() => tell({ height: document.body.offsetHeight })).observe(document.body);
+tell("ready");

@@ -1,40 +1,30 @@
 // Robot: an arm executes a movement, and everything that is checked before is shown.
-import { get, post } from "../parts/api.js";
+import { get, path, post } from "../parts/api.js";
 import { openArm } from "../parts/arm_frame.js";
 import { byId, fill, make } from "../parts/elements.js";
-import { library, onLibrary } from "../parts/library_state.js";
+import { library } from "../parts/library_state.js";
 import { save, tried } from "../parts/toasts.js";
-import { currentView, onShow } from "../parts/views.js";
+import { onShow } from "../parts/views.js";
 import { chooseToMove, draggedGoal, toMove } from "../parts/chosen.js";
 
 const USUAL = 0.5; // size of a movement, of the distance of the tip at rest
 
-/** @type {any} What the server answered about arms. */
-let arms = null;
+let arms = null; // what the server answered about them
 /** @type {{at?: number[], goal?: number[]}} Where the start and the goal were put, in the frame of the arm [m]. */
 let place = {};
-/** @type {any} What is shown. */
-let scene = null;
-/** @type {((message: Object) => void)|null} To the frame in which the arm is drawn. */
-let send = null;
+let scene = null; // what is shown
+let send = null; // to the frame in which the arm is drawn
 let planned = ""; // what was asked for last
 
-/** A row of two lines: a table beside the arm has no room for one. @param {string[]} cells */
+/** A row of two lines: a table beside the arm has no room for one. */
 function row([check, worst, limit, unit, time, result]) {
-  const cell = (/** @type {string} */ first, second = "") =>
-    make("td", {}, first, " ", make("span", { class: "says soft" }, second));
-  return make(
-    "tr",
-    { class: result === "FAILED" ? "failed" : null },
-    make("th", { scope: "row" }, check),
-    ...[cell(worst, `at\u00a0${time}\u00a0s`), cell(limit, unit.replace("^2", "²")), cell(result)],
-  );
+  const cell = (first, second = "") => make("td", {}, first, " ", make("span", "says soft", second));
+  const cells = [cell(worst, `at\u00a0${time}\u00a0s`), cell(limit, unit.replace("^2", "²")), cell(result)];
+  return make("tr", result === "FAILED" ? "failed" : "", make("th", { scope: "row" }, check), ...cells);
 }
 
-/** @param {any} answer */
-function showPreflight(answer) {
-  const { table, passed, refusal } = answer;
-  const failed = table.filter((/** @type {string[]} */ cells) => cells[5] === "FAILED");
+function showPreflight({ table, passed, refusal }) {
+  const failed = table.filter((cells) => cells[5] === "FAILED");
   byId("robot-preflight").hidden = !table.length;
   byId("robot-preflight").open = failed.length > 0;
   fill(byId("robot-checks"), ...[...new Set([...failed, ...table])].map(row));
@@ -45,7 +35,7 @@ function showPreflight(answer) {
     refusal ?? (passed ? `All ${all} passed.` : `${failed.length} of ${all} failed: it must not move.`);
 }
 
-/** @param {any} answer An arm at rest or a movement of it. */
+/** An arm at rest, or a movement of it. */
 function showArm(answer) {
   scene = answer.scene;
   send?.({ scene, joints: answer.joints });
@@ -59,10 +49,9 @@ function showPlace() {
   byId("robot-free").disabled = !place.at;
 }
 
-/** @returns {HTMLInputElement[]} */
 const placeInputs = () => [...byId("robot-place").querySelectorAll("input")];
 
-/** The start or the goal is put elsewhere. @param {"at"|"goal"} end @param {number[]} point */
+/** The start, "at", or the goal is put elsewhere. */
 function put(end, point) {
   const before = place.at ?? scene.start;
   if (end === "goal") place = { at: before, goal: point };
@@ -82,7 +71,7 @@ const wanted = () => ({
   ...place,
 });
 
-/** Plan what is asked for, unless it is what is shown. @param {boolean} [again] */
+/** Plan what is asked for, unless it is what is shown. */
 async function plan(again = false) {
   const body = wanted();
   const key = JSON.stringify([body, library().version]);
@@ -91,13 +80,11 @@ async function plan(again = false) {
   byId("robot-save").disabled = byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
-  const answer = await tried(() => post("/api/robots/move", body));
+  const answer = await tried(post("/api/robots/move", body));
   if (key !== planned) return; // something else is asked for since then
   byId("robot-go").disabled = false;
-  if (!answer) {
-    planned = byId("robot-verdict").textContent = "";
-    return;
-  }
+  if (!answer) planned = byId("robot-verdict").textContent = "";
+  if (!answer) return;
   showPreflight(answer);
   byId("robot-save").disabled = !answer.passed;
   if (answer.scene) showArm(answer);
@@ -107,7 +94,7 @@ async function plan(again = false) {
 async function chooseArm() {
   place = {};
   const name = byId("robot-arm").value;
-  const answer = await tried(() => get(`/api/robots/${name}`));
+  const answer = await tried(get(path`/api/robots/${name}`));
   if (!answer || name !== byId("robot-arm").value) return;
   byId("robot-size").value = (USUAL * Math.hypot(...answer.scene.goal)).toFixed(2);
   showArm(answer);
@@ -127,26 +114,21 @@ function offer() {
 
 /** Once. */
 async function offerArms() {
-  fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ value) => make("option", { value }, value)));
-  const hear = (/** @type {any} */ { end, point }) => put(end === "start" ? "at" : "goal", point);
+  fill(byId("robot-arm"), ...arms.robots.map((value) => make("option", { value }, value)));
+  const hear = ({ end, point }) => put(end === "start" ? "at" : "goal", point);
   send = await openArm(byId("arm"), "/arm.html", hear);
   await chooseArm();
 }
 
 async function shown() {
-  if (currentView() !== "robot") return;
   const isFirst = !arms;
-  arms ??= await tried(() => get("/api/robots"));
+  arms ??= await tried(get("/api/robots"));
   const { symbols } = library(); // as it is now: answers may come in another order
   const id = toMove(symbols);
-  const movable = symbols.filter((/** @type {any} */ symbol) => symbol.path);
+  const movable = symbols.filter((symbol) => symbol.path);
   const before = byId("robot-what").value;
-  fill(
-    byId("robot-what"),
-    ...movable.map((/** @type {any} */ symbol) =>
-      make("option", { value: symbol.id, selected: symbol.id === id }, symbol.name),
-    ),
-  );
+  const options = movable.map(({ id: value, name }) => make("option", { value, selected: value === id }, name));
+  fill(byId("robot-what"), ...options);
   if (before !== byId("robot-what").value) place = {};
   offer();
   if (!arms) return;
@@ -161,33 +143,28 @@ async function shown() {
 }
 
 export function startRobot() {
-  byId("robot-place").addEventListener("change", (event) => {
-    const { end } = /** @type {HTMLInputElement} */ (event.target).dataset;
-    const inputs = placeInputs().filter((input) => input.dataset.end === end);
-    if (inputs.every((input) => Number.isFinite(input.valueAsNumber)))
-      put(
-        /** @type {"at"|"goal"} */ (end),
-        inputs.map((input) => input.valueAsNumber),
-      );
-  });
-  byId("robot-free").addEventListener("click", () => {
+  for (const input of placeInputs())
+    input.onchange = () => {
+      const { end } = input.dataset;
+      const point = placeInputs().flatMap(({ dataset, valueAsNumber }) => (dataset.end === end ? [valueAsNumber] : []));
+      if (point.every(Number.isFinite)) put(end, point);
+    };
+  byId("robot-free").onclick = () => {
     place = {};
     plan();
-  });
-  byId("robot-form").addEventListener("submit", (event) => {
+  };
+  byId("robot-form").onsubmit = (event) => {
     event.preventDefault();
     plan(true);
-  });
-  byId("robot-what").addEventListener("change", () => {
+  };
+  byId("robot-what").onchange = () => {
     chooseToMove(byId("robot-what").value);
     place = {};
     offer();
     plan();
-  });
-  byId("robot-arm").addEventListener("change", chooseArm);
-  for (const id of /** @type {const} */ (["robot-size", "robot-slow", "robot-dragged"]))
-    byId(id).addEventListener("change", () => plan());
-  byId("robot-save").addEventListener("click", saveJoints);
+  };
+  byId("robot-arm").onchange = chooseArm;
+  for (const id of ["robot-size", "robot-slow", "robot-dragged"]) byId(id).onchange = () => plan();
+  byId("robot-save").onclick = saveJoints;
   onShow("robot", shown);
-  onLibrary(shown);
 }

@@ -10,17 +10,15 @@ const MOST = 500; // samples in one message
 
 const id = crypto.randomUUID();
 const button = byId("wand-hold");
-/** @type {number[][]} */
 let ink = [];
 let sent = 0; // samples of it
 let over = false; // it has ended, and the studio is still to be told
 let busy = false;
 let lost = true;
 let allowed = false; // the person was asked, where the browser wants that
-/** @type {{time: number, right: number[], up: number[]}|null} The plane that is drawn on, as the button was pressed. */
-let plane = null;
+let plane = null; // that is drawn on, as the button was pressed
 
-const note = (/** @type {string} */ text) => write(byId("wand-note"), text);
+const note = (text) => write(byId("wand-note"), text);
 const board = new Board(byId("wand-canvas"), ({ context, height }) => {
   const pixels = ink.map(([, x, y]) => [x * height, (1 - y) * height]);
   line(context, pixels, { color: color("--ink"), width: 5 });
@@ -51,7 +49,7 @@ async function tell() {
   busy = false;
 }
 
-/** @type {import("../parts/stroke.js").Hearer} */
+/** @type {Hearer} */
 const hearer = {
   begins: () => {
     [ink, sent, over, plane] = [[], 0, false, null];
@@ -68,14 +66,14 @@ const hearer = {
   },
 };
 
-/** The upper edge of the phone points. @param {DeviceOrientationEvent} event Angles as the W3C defines them. */
+/** The upper edge of the phone points; angles are as the W3C defines them. */
 function turned({ alpha, beta, timeStamp }) {
   if (alpha === null || !button.classList.contains("held")) return;
   const [a, b] = [alpha, beta].map((angle) => (angle * Math.PI) / 180);
   const [x, y, z] = [-Math.sin(a) * Math.cos(b), Math.cos(a) * Math.cos(b), Math.sin(b)]; // east, north, up
   const flat = Math.hypot(x, y);
   plane ??= { time: timeStamp, right: [y / flat, -x / flat, 0], up: [(-z * x) / flat, (-z * y) / flat, flat] };
-  const along = (/** @type {number[]} */ axis) => REACH * (axis[0] * x + axis[1] * y + axis[2] * z);
+  const along = (axis) => REACH * (axis[0] * x + axis[1] * y + axis[2] * z);
   const middle = board.width / board.height / 2;
   hearer.goes([[(timeStamp - plane.time) / 1000, middle + along(plane.right), 0.5 + along(plane.up)]]);
 }
@@ -83,20 +81,21 @@ function turned({ alpha, beta, timeStamp }) {
 async function release() {
   button.classList.remove("held");
   if (ink.length) return hearer.ends();
-  const { requestPermission: ask } = /** @type {any} */ (window.DeviceOrientationEvent ?? {}); // only after a touch
-  const may = !allowed && ask && (await ask()) === "granted";
+  /** @type {any} */
+  const asked = window.DeviceOrientationEvent; // only after a touch
+  const may = !allowed && (await asked?.requestPermission?.()) === "granted";
   allowed = true;
   note(may ? "Now hold the button and move" : "This phone does not tell how it turns. Draw with a finger");
 }
 
 followPointer(byId("wand-canvas"), hearer);
 window.addEventListener("deviceorientation", turned);
-button.addEventListener("pointerdown", (event) => {
+button.onpointerdown = (event) => {
   button.setPointerCapture(event.pointerId);
   button.classList.add("held");
   hearer.begins("wand");
-});
-button.addEventListener("lostpointercapture", release);
-button.addEventListener("contextmenu", (event) => event.preventDefault());
+};
+button.onlostpointercapture = release;
+button.oncontextmenu = () => false; // no menu
 setInterval(tell, BEAT);
 tell();
