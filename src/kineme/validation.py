@@ -191,6 +191,15 @@ def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array
     return t
 
 
+def as_point(name: str, values: ArrayLike, axes: Sequence[str]) -> Array:
+    """Return one finite number for each axis, as float64 (n,)."""
+    point = as_numbers(values, name)
+    if point.shape != (len(axes),) or not np.isfinite(point).all():
+        words = f"{len(axes)} finite numbers, {', '.join(axes)}"
+        raise SpecificationError(f"expected {name} as {words}, got {np.asarray(values).tolist()!r:.80}")
+    return point
+
+
 def as_path(path: Any, expected: str, instead: str = "") -> Path:
     """A path as `Path`; anything else is refused as not what was `expected`, with what to do `instead`."""
     try:

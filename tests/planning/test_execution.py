@@ -387,7 +387,7 @@ def test_recordings_may_have_an_origin_of_their_own(table):
     assert apart(world) < 0.02
     np.testing.assert_allclose(execution.runs[1].tips[-1], np.add(OBJECTS["tray"], origin), atol=0.01)
     assert execution.state["tray_x"] == pytest.approx(OBJECTS["tray"][0])
-    with pytest.raises(SpecificationError, match="origin as three finite numbers"):
+    with pytest.raises(SpecificationError, match="origin as 3 finite numbers"):
         check_steps(plan, library, robot, origin=(0, 0))
 
 

@@ -29,10 +29,24 @@ def write(text: Any = "", *, err: bool = False) -> None:
     click.echo(printable_lines(text), err=err)
 
 
-def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
-    """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file."""
+def check_new(
+    path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force", endings: Sequence[str] = (),
+    flag: str | None = None,
+) -> None:  # fmt: skip
+    """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file.
+
+    With `endings`, "" of a folder, the path of an option `flag` has one of them, and its folder is there.
+    """
     if path is None or str(path) == "-":
         return
+    if endings:
+        if path.suffix.lower() not in endings:
+            expected = ", ".join(ending or "a new folder" for ending in endings)
+            raise click.BadParameter(f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=flag)
+        if path.is_dir():
+            raise click.UsageError(f"expected a new file or folder to write, {printable(path)} is there")
+        if not path.absolute().parent.is_dir():
+            raise click.UsageError(f"expected a folder to write {printable(path)} into, there is none; create it")
     if not path.exists():
         parent = next(folder for folder in path.absolute().parents if folder.exists())
         if not os.access(parent, os.W_OK):

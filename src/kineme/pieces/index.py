@@ -46,10 +46,7 @@ def groups_of(shards: Sequence[Shard], most: int) -> list[range]:
 
 
 def open_group(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> Group:
-    """Return the index of shards, from its files or made; shards are numbered from 0, `chosen` are representations.
-
-    Raises `DataError`: reduced features that are damaged.
-    """
+    """Return the index of shards, from its files or made; shards are numbered from 0, `chosen` are representations."""
     path = folder / f"{FOLDER}{_key(plan, chosen, reduction, shards)}"
     names = (*Index._fields, *Group._fields[1:])
     with suppress(OSError, ValueError, EOFError):  # none there, or damaged: it is made
@@ -81,14 +78,10 @@ def remove_others(
 
 
 def _key(plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> str:
-    states = [(shard.path.name, *_size_and_time(shard.path)) for shard in shards]
+    files = [(shard.path.name, shard.path.stat()) for shard in shards]
+    states = [(name, status.st_size, status.st_mtime_ns) for name, status in files]
     said = repr((_FORMAT, BLOCK, reduction.digest, chosen, plan.kind, plan.n_marks, states))
     return hashlib.sha256(said.encode()).hexdigest()[:24]
-
-
-def _size_and_time(path: Path) -> tuple[int, int]:
-    status = path.stat()
-    return status.st_size, status.st_mtime_ns
 
 
 def _fits(group: Group, plan: Plan, shards: Sequence[Shard]) -> bool:

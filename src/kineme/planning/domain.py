@@ -244,7 +244,11 @@ def domain_from_dict(data: Any) -> Domain:
             n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
             if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
                 raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
-        operators = tuple(_operator_from(operator) for operator in data["operators"])
+        records = (("parameters", Parameter), ("preconditions", Literal), ("effects", Literal), ("evidence", Evidence))
+        operators = tuple(
+            _record(Operator, row | {part: tuple(_record(of, each) for each in row[part]) for part, of in records})
+            for row in data["operators"]
+        )
         places = {name: tuple(map(float, where)) for name, where in data["places"].items()}
         edits = tuple(_record(Edit, edit | {"literal": _record(Literal, edit["literal"])}) for edit in data["edits"])
         domain = Domain(vocabulary, operators, places, edits)
@@ -268,13 +272,6 @@ def read_json(path: str | Path, what: str) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise DataError(f"expected a {what} in JSON, {path} is none: {error}") from error
-
-
-def _operator_from(data: Mapping[str, Any]) -> Operator:
-    records = {"parameters": Parameter, "preconditions": Literal, "effects": Literal, "evidence": Evidence}
-    return _record(
-        Operator, {**data} | {part: tuple(_record(of, row) for row in data[part]) for part, of in records.items()}
-    )
 
 
 def _record(of: Any, data: Mapping[str, Any]) -> Any:

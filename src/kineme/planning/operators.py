@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -143,13 +143,8 @@ def _example(vocabulary: Vocabulary, states: States, row: int) -> Example:
     ]
     places = places_of(vocabulary, moments)
     before, after = (facts_of(vocabulary, moment, places) for moment in moments)
-    return Example(
-        int(states.movements[row]),
-        places,
-        before,
-        after,
-        (hand_of(vocabulary, moments[0]), hand_of(vocabulary, moments[1])),
-    )
+    hands = hand_of(vocabulary, moments[0]), hand_of(vocabulary, moments[1])
+    return Example(int(states.movements[row]), places, before, after, hands)
 
 
 def _holds_at(facts: Mapping[Fact, bool], predicate: str, *known: str) -> list[str]:
@@ -245,7 +240,13 @@ def _literals(
 ) -> _Literals:
     """Return what held before all movements, what changed, and the counts."""
     literals = _Literals([], [], [], [], [])
-    for predicate, arguments in _candidates(rules.predicates, parameters):
+    candidates = (
+        (predicate, tuple(parameter.name for parameter in chosen))
+        for predicate, types in rules.predicates.items()
+        for chosen in itertools.permutations(parameters, len(types))
+        if tuple(parameter.type for parameter in chosen) == types
+    )
+    for predicate, arguments in candidates:
         facts = [(predicate, *(each[argument] for argument in arguments)) for _, each in pairs]
         known = [
             (example.movement, example.before[fact], example.after[fact])
@@ -328,16 +329,6 @@ def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]], fi
         return Parameter(role, "item", kinds)
     where = np.array([example.places[each[role]] for example, each in pairs])
     return Parameter(role, "place", kinds, tuple(where.min(axis=0).tolist()), tuple(where.max(axis=0).tolist()))
-
-
-def _candidates(
-    predicates: Mapping[str, tuple[str, ...]], parameters: Sequence[Parameter]
-) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each predicate with each choice of parameters of its types."""
-    for predicate, types in predicates.items():
-        for chosen in itertools.permutations(parameters, len(types)):
-            if tuple(parameter.type for parameter in chosen) == types:
-                yield predicate, tuple(parameter.name for parameter in chosen)
 
 
 def _visited(vocabulary: Vocabulary, examples: Iterable[Example]) -> dict[str, tuple[float, ...]]:

@@ -185,13 +185,7 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
 
 
 def check_plan(plan: Plan) -> None:
-    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so.
-
-    Raises
-    ------
-    SpecificationError
-        The first such step with all reasons, or the goals that are missed.
-    """
+    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so."""
     domain, facts = plan.problem.domain, dict(plan.problem.facts)
     for number, step in enumerate(plan.steps, 1):
         operator = domain.operator(step.operator)
@@ -211,10 +205,7 @@ def plan_to_dict(plan: Plan) -> dict[str, Any]:
     """Return a plan with its problem and domain as plain data that JSON can hold; `plan_from_dict` reads it."""
     problem = plan.problem
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "planner": plan.planner,
-        "duration": plan.duration,
+        **{"format": FORMAT, "version": VERSION, "planner": plan.planner, "duration": plan.duration},
         "steps": [step._asdict() | {"start": [*step.start], "goal": [*step.goal]} for step in plan.steps],
         "goal": [{"fact": [*goal.fact], "value": goal.value} for goal in problem.goal],
         "places": {name: where.tolist() for name, where in problem.places.items()},

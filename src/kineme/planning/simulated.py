@@ -15,7 +15,6 @@ from kineme.planning.under_way import frame_of
 from kineme.planning.vocabulary import Fact, Vocabulary
 from kineme.robots.kinematics.descent import InverseKinematics, point_in_words, reaching_postures
 from kineme.robots.simulation import Simulation
-from kineme.validation import Array
 
 _FORM = "push:FX,FY,FZ@SECONDS, OBJECT:X,Y,Z@SECONDS or OBJECT:gone@SECONDS"
 
@@ -45,7 +44,10 @@ def simulation_of(
     objects |= {fact[1]: places[fact[2]] for fact, value in problem.facts.items() if value and fact[0] == "in"}
     joints = robot.rest
     if plan.steps and plan.steps[0].start:
-        joints = _posture(robot, joints, frame.to_robot(np.array(plan.steps[0].start)), follow)
+        ik, position = InverseKinematics(robot, follow), frame.to_robot(np.array(plan.steps[0].start))
+        what = f"the place where the plan begins, {point_in_words(position)} m"
+        reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
+        joints = reached[int(np.argmin(np.abs(reached - joints).max(axis=1)))]  # the nearest, turned as at rest
     held = [fact[1] for fact, value in problem.facts.items() if value and fact[0] == "holding"]
     tip = Simulation(robot, start=joints).state()
     objects |= dict.fromkeys(held, np.array([tip[f"tip_{axis}"] for axis in "xyz"]))
@@ -60,14 +62,6 @@ def simulation_of(
     )  # fmt: skip
     simulation.grip(bool(held))
     return simulation
-
-
-def _posture(robot: Any, joints: Array, position: Array, follow: str) -> Array:
-    """Return the joints, nearest to some, that bring the tip to a position, turned as at rest."""
-    ik = InverseKinematics(robot, follow)
-    what = f"the place where the plan begins, {point_in_words(position)} m"
-    reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
-    return np.asarray(reached[int(np.argmin(np.abs(reached - joints).max(axis=1)))])
 
 
 def assume_flags(simulation: Simulation, plan: Plan) -> Callable[[Step], None]:

@@ -23,7 +23,7 @@ from kineme.reporting.text import first_names, printable
 from kineme.robots.models.robot import Robot, check_start
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.sampling import evenly_spaced
-from kineme.validation import Array, as_numbers
+from kineme.validation import as_point
 
 PATIENCE = 600.0  # seconds after which an approval comes too late: the arm may stand elsewhere
 _PATH_POINTS = 21  # of a path in an answer
@@ -95,9 +95,7 @@ class SkillTools:
         symbols: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.library, self.robot, self.execute = library, robot, execute
-        self.joints: Array = robot.rest if joints is None else as_numbers(joints, "joints")
-        if self.joints.shape != (robot.n_joints,):
-            raise SpecificationError(f"expected joints as {robot.n_joints} numbers, got shape {self.joints.shape}")
+        self.joints = robot.rest if joints is None else as_point("joints", joints, robot.joints)
         check_start(robot, self.joints)
         self._offered = {library[who].id for who in symbols}
         self._question: Question | None = None  # the last one, until it is answered

@@ -261,9 +261,8 @@ def _rows_by_moment(
     who, moment, _ = heads
     index = {str(key): row for row, key in enumerate(ids.tolist())}
     for row, record in enumerate(read.records(library.store, ids)):
-        for name in {record["name"] or "", PurePath(record["name"] or "").name, PurePath(record["name"] or "").stem} - {
-            ""
-        }:
+        path = PurePath(record["name"] or "")
+        for name in {record["name"] or "", path.name, path.stem} - {""}:
             index[name] = -2 if name in index and index[name] != row else row
     before, after = np.full((2, len(ids)), -1)
     for k, (name, when) in enumerate(zip(cells[who], cells[moment], strict=True)):

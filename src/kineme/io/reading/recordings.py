@@ -183,7 +183,10 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
 ) -> Recordings:
     """Read recordings as `read_recordings` does, and the standard input as a file of some name."""
     max_file_bytes()
-    _check_rule(rule, layout)
+    if rule.label_by is not None and layout.label is not None:
+        raise SpecificationError("expected label or label_by, not both")
+    if rule.names_person and layout.person is not None:
+        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
     entries, problems = entries_of(paths, follow_links)
     recordings = read_entries(
         entries,
@@ -200,14 +203,6 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     given = [] if standard_input is None else [Path(standard_input[0])]
     check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
     return recordings
-
-
-def _check_rule(rule: NameRule, layout: Layout) -> None:
-    """Refuse two origins of a label, or of a person."""
-    if rule.label_by is not None and layout.label is not None:
-        raise SpecificationError("expected label or label_by, not both")
-    if rule.names_person and layout.person is not None:
-        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
 
 
 def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has found
