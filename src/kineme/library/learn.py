@@ -48,16 +48,10 @@ _BATCH_SAMPLES = 2_000_000
 class LearnReport:
     """The result of learning.
 
-    Attributes
-    ----------
-    added, duplicates : int
-        Number of movements that were stored, and of those that were stored before.
-    symbols : tuple of str
-        Names of new symbols.
-    ids : ndarray of shape (n,)
-        Ids of the movements in the given order; for movements stored before, the existing id.
-    version : int
-        Version that this call made, the last one of several; where nothing changed, the one that it found.
+    - `added`, `duplicates`: number of movements that were stored, and of those that were stored before.
+    - `symbols`: names of new ones.
+    - `ids` (n,): of the movements in the given order; for movements stored before, the existing id.
+    - `version`: that this call made, the last one of several; where nothing changed, the one that it found.
     """
 
     added: int
