@@ -66,10 +66,7 @@ class ConceptualSpace:
         where half way along an arc of angle t the detour is ``1 / cos(t / 4) - 1``, 0.08 at a right angle. A symbol
         between is also nearer to each of the two than they are to each other.
 
-        Raises
-        ------
-        SpecificationError
-            A symbol that is not among `symbols`, twice the same, or `eps` below 0.
+        Raises `SpecificationError`: a symbol that is not among `symbols`, twice the same, or `eps` below 0.
         """
         check_number("eps", eps, least=0.0)
         i, j = self.index(a), self.index(b)
@@ -88,10 +85,7 @@ class ConceptualSpace:
     def index(self, symbol: Any) -> int:
         """Index of a symbol among `symbols`.
 
-        Raises
-        ------
-        SpecificationError
-            It is not among them.
+        Raises `SpecificationError`: it is not among them.
         """
         if symbol not in self.symbols:
             raise SpecificationError(f"expected one of the symbols {list(self.symbols)}, got {symbol!r}")

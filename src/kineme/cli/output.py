@@ -41,7 +41,7 @@ def check_new(
         return
     if endings:
         if path.suffix.lower() not in endings:
-            expected = ", ".join(ending or "a new folder" for ending in endings)
+            expected = ", ".join(ending or "a folder" for ending in endings)
             raise click.BadParameter(f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=flag)
         if path.is_dir():
             raise click.UsageError(f"expected a new file or folder to write, {printable(path)} is there")

@@ -133,13 +133,9 @@ class Batch:
     def concatenate(cls, batches: Iterable[Self]) -> Self:
         """Concatenate several batches, in the order given.
 
-        Raises
-        ------
-        SpecificationError
-            Batches of different specifications: their weights are not comparable.
-        TrajectoryError
-            No batch, something that is not a batch, batches of different dimensions, labels on some batches only;
-            channels that are known to differ, as joint angles and positions.
+        Raises `SpecificationError`: batches of different specifications: their weights are not comparable. Raises
+        `TrajectoryError`: no batch, something that is not a batch, batches of different dimensions, labels on some
+        batches only; channels that are known to differ, as joint angles and positions.
         """
         batches = list(batches)
         if not batches or not all(isinstance(batch, cls) for batch in batches):
@@ -181,12 +177,8 @@ class Batch:
     def save(self, path: str | Path) -> Path:
         """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
 
-        Raises
-        ------
-        DataError
-            Labels or preprocessing steps that plain data cannot hold.
-        OSError
-            The file cannot be written; what was there before stays.
+        Raises `DataError`: labels or preprocessing steps that plain data cannot hold. Raises `OSError`: the file cannot
+        be written; what was there before stays.
         """
         from kineme.io.arrays.npz import write_container  # files load when they are used
 
@@ -200,12 +192,8 @@ class Batch:
     def load(cls, path: str | Path) -> Self:
         """Read a file of `save`. The file is data: nothing in it is executed.
 
-        Raises
-        ------
-        DataError
-            The file is foreign, truncated, damaged, of another kind or of a later version; or it is a folder.
-        FileNotFoundError
-            There is no such file.
+        Raises `DataError`: the file is foreign, truncated, damaged, of another kind or of a later version; or it is a
+        folder. Raises `FileNotFoundError`: there is no such file.
         """
         from kineme.io.arrays.npz import read_container
 

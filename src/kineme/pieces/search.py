@@ -36,26 +36,14 @@ _WRONG = 1e-2  # share of a norm by which reduced features may differ from those
 
 
 class Near(NamedTuple):
-    """A movement that is near.
+    """A movement that is near."""
 
-    Attributes
-    ----------
-    path, place : str
-        The file, relative to its archive, and which movement of it; empty if it holds but one.
-    start, duration : float
-        In the time of the file [s].
-    label : str or None
-        That the file gives it.
-    similarity : float
-        Averaged kernel, from 0 to 1.
-    """
-
-    path: str
-    place: str
-    start: float
+    path: str  # the file, relative to its archive
+    place: str  # which movement of it; empty if it holds but one
+    start: float  # in the time of the file [s]
     duration: float
-    label: str | None
-    similarity: float
+    label: str | None  # that the file gives it
+    similarity: float  # averaged kernel, from 0 to 1
 
 
 class Candidates(NamedTuple):

@@ -58,39 +58,20 @@ class Evidence(NamedTuple):
 
 @dataclass(frozen=True)
 class Operator:
-    """One symbol as an action of a planner.
-
-    Attributes
-    ----------
-    name, symbol_id : str
-    parameters : tuple of Parameter
-    preconditions, effects : tuple of Literal
-    duration : float
-        Median [s].
-    begin, end : tuple of k float
-        Hand minus the first place at the start, and minus the last place at the end: medians.
-    displacement : tuple of two tuples of k float
-        Least and largest way of the hand.
-    evidence : tuple of Evidence
-    cannot_tell : tuple of str
-        What the states do not decide.
-    usable : bool
-        Whether a planner gets it: not if an effect came after some movements and not after others.
-    movements : tuple of int
-    """
+    """One symbol as an action of a planner."""
 
     name: str
     symbol_id: str
     parameters: tuple[Parameter, ...]
     preconditions: tuple[Literal, ...]
     effects: tuple[Literal, ...]
-    duration: float
-    begin: tuple[float, ...]
-    end: tuple[float, ...]
-    displacement: tuple[tuple[float, ...], tuple[float, ...]]
+    duration: float  # median [s]
+    begin: tuple[float, ...]  # (k,) median of the hand minus the first place at the start
+    end: tuple[float, ...]  # (k,) median of the hand minus the last place at the end
+    displacement: tuple[tuple[float, ...], tuple[float, ...]]  # (2, k) least and largest way of the hand
     evidence: tuple[Evidence, ...]
-    cannot_tell: tuple[str, ...]
-    usable: bool
+    cannot_tell: tuple[str, ...]  # what the states do not decide
+    usable: bool  # whether a planner gets it: not if an effect came after some movements and not after others
     movements: tuple[int, ...]
 
     @property
@@ -110,22 +91,12 @@ class Edit(NamedTuple):
 
 @dataclass(frozen=True)
 class Domain:
-    """What a planner knows: operators, what can be said of a state, and places.
-
-    Attributes
-    ----------
-    vocabulary : Vocabulary
-    operators : tuple of Operator
-    places : mapping of str to tuple of k float
-        Places without a fixture that were visited, by name.
-    edits : tuple of Edit
-        Of a person, and already made in `operators`.
-    """
+    """What a planner knows: operators, what can be said of a state, and places."""
 
     vocabulary: Vocabulary
     operators: tuple[Operator, ...]
-    places: Mapping[str, tuple[float, ...]]
-    edits: tuple[Edit, ...] = ()
+    places: Mapping[str, tuple[float, ...]]  # (k,) of each name: places without a fixture that were visited
+    edits: tuple[Edit, ...] = ()  # of a person, and already made in `operators`
 
     def operator(self, name: str) -> Operator:
         """Return the operator of a symbol."""
@@ -230,10 +201,7 @@ def domain_to_dict(domain: Domain) -> dict[str, Any]:
 def domain_from_dict(data: Any) -> Domain:
     """Return the domain of `domain_to_dict`.
 
-    Raises
-    ------
-    DataError
-        Anything else, or a domain of a later version.
+    Raises `DataError`: anything else, or a domain of a later version.
     """
     check_form(data, "domain", FORMAT, VERSION, "write one by kineme operators")
     try:

@@ -46,14 +46,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Steps from the state now to a goal.
-
-    Attributes
-    ----------
-    problem : Problem
-    steps : tuple of Step
-    planner : str
-    """
+    """Steps from the state now to a goal."""
 
     problem: Problem
     steps: tuple[Step, ...]
@@ -217,12 +210,8 @@ def plan_to_dict(plan: Plan) -> dict[str, Any]:
 def plan_from_dict(data: Any) -> Plan:
     """Return the plan of `plan_to_dict`, checked.
 
-    Raises
-    ------
-    DataError
-        Anything else, or a plan of a later version.
-    SpecificationError
-        A step that cannot be done; see `check_plan`.
+    Raises `DataError`: anything else, or a plan of a later version. Raises `SpecificationError`: a step that cannot be
+    done; see `check_plan`.
     """
     check_form(data, "plan", FORMAT, VERSION)
     try:

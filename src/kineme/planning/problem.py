@@ -32,20 +32,11 @@ class Goal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The state now, in a domain's words, and a goal.
-
-    Attributes
-    ----------
-    domain : Domain
-    places : mapping of str to ndarray of shape (k,)
-    facts : mapping of Fact to bool
-        What is not among them is not known.
-    goal : tuple of Goal
-    """
+    """The state now, in a domain's words, and a goal."""
 
     domain: Domain
-    places: Mapping[str, Array]
-    facts: Mapping[Fact, bool]
+    places: Mapping[str, Array]  # (k,) each
+    facts: Mapping[Fact, bool]  # what is not among them is not known
     goal: tuple[Goal, ...]
 
     @property

@@ -32,10 +32,7 @@ def simulation_of(
     `origin` (3,) is that of the plan in the frame of the robot [m], and `follow` how much of the orientation, as in
     `execute`.
 
-    Raises
-    ------
-    SpecificationError
-        A first place out of reach.
+    Raises `SpecificationError`: a first place out of reach.
     """
     problem = plan.problem
     frame, vocabulary = frame_of(plan, origin), problem.domain.vocabulary
@@ -96,10 +93,7 @@ def _flags(vocabulary: Vocabulary, facts: Mapping[Fact, bool]) -> dict[str, Any]
 def disturb(simulation: Simulation, disturbances: Sequence[str]) -> None:
     """Schedule disturbances: ``push:0,30,0@1.5`` [N], ``cup:0.4,0.1,0.2@3`` [m], ``cup:gone@3``, each at its time [s].
 
-    Raises
-    ------
-    SpecificationError
-        A text of another form, or an object that is not there.
+    Raises `SpecificationError`: a text of another form, or an object that is not there.
     """
     for text in disturbances:
         rest, _, seconds = text.rpartition("@")

@@ -22,31 +22,17 @@ _GRIPPERS = ("grip", "grasp", "finger")
 
 @dataclass(frozen=True, eq=False)
 class Skill:
-    """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move.
-
-    Attributes
-    ----------
-    name, id, description : str
-    movements : ndarray of shape (n,)
-        Ids of its movements in the library.
-    starts, goals : ndarray of shape (n, k)
-    durations : ndarray of shape (n,)
-        [s].
-    axes : tuple of k str
-        Names of the coordinates.
-    units : tuple of k str or None
-        Their units, None where the recordings do not say it.
-    """
+    """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move."""
 
     name: str
     id: str
     description: str
-    movements: NDArray[np.int64]
-    starts: Array
-    goals: Array
-    durations: Array
-    axes: tuple[str, ...]
-    units: tuple[str | None, ...]
+    movements: NDArray[np.int64]  # (n,) their ids in the library
+    starts: Array  # (n, k)
+    goals: Array  # (n, k)
+    durations: Array  # (n,) [s]
+    axes: tuple[str, ...]  # names of the k coordinates
+    units: tuple[str | None, ...]  # of each, None where the recordings do not say it
 
     @property
     def shown(self) -> dict[str, Array]:
@@ -80,10 +66,7 @@ class Excess(NamedTuple):
 def skill_of(library: ActionLibrary, who: str) -> Skill:
     """Return what was shown of a symbol.
 
-    Raises
-    ------
-    SpecificationError
-        No such symbol, or one without movements.
+    Raises `SpecificationError`: no such symbol, or one without movements.
     """
     symbol = library[who]
     if not len(symbol):

@@ -117,10 +117,8 @@ class SkillTools:
     def call(self, tool: str, arguments: dict[str, Any]) -> Answer | Question:
         """Answer a call; a call to move is answered by the question to the person, and nothing moves before `decide`.
 
-        Raises
-        ------
-        SpecificationError
-            No such tool, or arguments that its schema does not allow; ranges aside, which the answer speaks of.
+        Raises `SpecificationError`: no such tool, or arguments that its schema does not allow; ranges aside, which the
+        answer speaks of.
         """
         tools = self.tools()
         if tool not in tools:
@@ -153,10 +151,8 @@ class SkillTools:
     def decide(self, token: str, tool: str, arguments: dict[str, Any], decision: str) -> Answer:
         """Execute the movement of the last question if the `decision` is "accept"; a question is answered once.
 
-        Raises
-        ------
-        SpecificationError
-            The token or the call is not that of the last question, that one is too old, or the library has changed.
+        Raises `SpecificationError`: the token or the call is not that of the last question, that one is too old, or the
+        library has changed.
         """
         question, self._question = self._question, None
         if (
@@ -287,10 +283,7 @@ def skills_server(tools: SkillTools) -> Any:
     where the client cannot ask, or the answer is anything but yes, nothing moves. An approval holds once, for the
     movement that was shown.
 
-    Raises
-    ------
-    DataError
-        The extra ``mcp`` is not installed.
+    Raises `DataError`: the extra ``mcp`` is not installed.
     """
     with needs("mcp", "serve skills", "mcp"):
         import anyio

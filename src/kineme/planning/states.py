@@ -41,28 +41,16 @@ State = Mapping[str, Any]
 class States:
     """States before and after n movements, in c columns.
 
-    Attributes
-    ----------
-    movements : ndarray of shape (n,)
-        Ids in the library.
-    symbols : tuple of n str
-    axes : tuple of k str
-        Coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are where the
-        hand is.
-    columns : tuple of c str
-    before, after : ndarray of shape (n, c)
-        NaN is not known; of columns of words, the number of the word.
-    words : mapping of str to tuple of str
-        Words of the columns that have some.
+    The columns ``hand_x`` ... are where the hand is. NaN is not known; a word is its number in the words of its column.
     """
 
-    movements: NDArray[np.int64]
-    symbols: tuple[str, ...]
-    axes: tuple[str, ...]
+    movements: NDArray[np.int64]  # (n,) ids in the library
+    symbols: tuple[str, ...]  # of each movement
+    axes: tuple[str, ...]  # k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``
     columns: tuple[str, ...]
-    before: Array
-    after: Array
-    words: Mapping[str, tuple[str, ...]]
+    before: Array  # (n, c)
+    after: Array  # (n, c)
+    words: Mapping[str, tuple[str, ...]]  # of the columns that have some
 
     def __len__(self) -> int:
         return len(self.movements)

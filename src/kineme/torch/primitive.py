@@ -202,10 +202,7 @@ class Primitive(torch.nn.Module):
 
         Weights mean the same: learned at 50 Hz, they move at 1 kHz. Learned durations are replaced by the given one.
 
-        Raises
-        ------
-        SpecificationError
-            A rate too low to follow the dynamics; a duration of 0 or less.
+        Raises `SpecificationError`: a rate too low to follow the dynamics; a duration of 0 or less.
         """
         if duration is not None:
             check_number("duration", duration, above=0.0)
@@ -344,12 +341,8 @@ class Primitive(torch.nn.Module):
         One matrix product, the fit of `kineme.DMP.learn`. Together with their first sample and `initial_velocity` they
         are what the movements are repeated from.
 
-        Raises
-        ------
-        TrajectoryError
-            Another number of samples or dimensions.
-        SpecificationError
-            A specification with preprocessing steps, which work on recordings.
+        Raises `TrajectoryError`: another number of samples or dimensions. Raises `SpecificationError`: a specification
+        with preprocessing steps, which work on recordings.
         """
         relative, goal = self._relative(positions)
         weights, distance = relative @ self.encode_matrix, self._distance(relative[..., -1])

@@ -191,10 +191,7 @@ class Primitives(Batch):
     def weights(self) -> Array:
         """Weights w of Eq. (2), shape (n, N, d).
 
-        Raises
-        ------
-        DegenerateMovementError
-            In the original formulation, where ``g = x0`` in a dimension.
+        Raises `DegenerateMovementError`: in the original formulation, where ``g = x0`` in a dimension.
         """
         return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
 
@@ -203,10 +200,7 @@ class Primitives(Batch):
 
         Contains s if the specification's gating is "phase"; never contains K or g - x0.
 
-        Raises
-        ------
-        DegenerateMovementError
-            In the original formulation, where ``g = x0`` in a dimension.
+        Raises `DegenerateMovementError`: in the original formulation, where ``g = x0`` in a dimension.
         """
         return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
 
@@ -315,10 +309,7 @@ class Primitives(Batch):
 
         They move so without being told; they are saved, recognized, controlled and moved to other goals like any other.
 
-        Raises
-        ------
-        SpecificationError
-            A rollout with a goal that moves, which a primitive has not.
+        Raises `SpecificationError`: a rollout with a goal that moves, which a primitive has not.
         """
         if movement.goal_velocities is not None and movement.goal_velocities.any():
             raise SpecificationError(

@@ -287,10 +287,7 @@ class PosePrimitives(Batch):
     def from_rollout(cls, movement: PoseRollout) -> PosePrimitives:
         """The movements of a rollout as primitives of their own; see `Primitives.from_rollout`.
 
-        Raises
-        ------
-        SpecificationError
-            A rollout with a goal that moves, which a primitive has not.
+        Raises `SpecificationError`: a rollout with a goal that moves, which a primitive has not.
         """
         about, n = movement.recorded_as, len(movement)
         if about is not None and len(movement.tangent.primitives) < n:
@@ -322,10 +319,8 @@ class PosePrimitives(Batch):
         `Options` hold for linear and angular velocities and accelerations, as the state reports them; obstacles are
         points (m, 3) that the position steers around; `settle` holds for positions and rotation vectors [rad].
 
-        Raises
-        ------
-        SpecificationError, TrajectoryError
-            More than one primitive; an option out of its range; a start or goal that is no pose.
+        Raises `SpecificationError` or `TrajectoryError`: more than one primitive; an option out of its range; a start
+        or goal that is no pose.
         """
         if duration is not None:
             check_number("duration", duration, above=0.0)

@@ -307,10 +307,7 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
 def average_by_label(primitives: Primitives | MovementsLike) -> dict[Any, AveragePrimitive]:
     """One `average` for each label, in sorted order.
 
-    Raises
-    ------
-    TrajectoryError
-        Primitives without labels.
+    Raises `TrajectoryError`: primitives without labels.
     """
     primitives = parameters.as_primitives(primitives)
     if primitives.labels is None:

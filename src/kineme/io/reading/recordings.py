@@ -283,14 +283,9 @@ def trimmed(recordings: Recordings) -> Recordings:
 def read_recording(path: str | Path) -> Trajectory:
     """Read a file that holds one movement, in any format of `kineme.io.reading.formats.FORMATS`.
 
-    Raises
-    ------
-    DataError
-        The file is not what its name says, or holds several movements; the message names the line.
-    FileNotFoundError
-        There is no such file.
-    TrajectoryError
-        The numbers are no movement, see `Trajectory`.
+    Raises `DataError`: the file is not what its name says, or holds several movements; the message names the line.
+    Raises `FileNotFoundError`: there is no such file. Raises `TrajectoryError`: the numbers are no movement, see
+    `Trajectory`.
     """
     path = Path(path)
     if data_set_of(path) is None:
