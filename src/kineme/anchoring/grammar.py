@@ -63,12 +63,7 @@ class Grammar:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data: the symbols, probabilities, and counts."""
-        return {
-            "symbols": list(self.symbols),
-            "initial": self.initial.tolist(),
-            "transitions": self.transitions.tolist(),
-            "counts": self.counts.tolist(),
-        }
+        return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
 
 class Posterior(NamedTuple):

@@ -96,7 +96,6 @@ def conceptual_space(
     symbols: Sequence[Hashable],
     prototypes: Described | MovementsLike,
     like: Compares | None = None,
-    widths: ArrayLike | None = None,
 ) -> ConceptualSpace:
     """Distances between symbols, by their prototypes.
 
@@ -105,7 +104,8 @@ def conceptual_space(
     distance as a Gaussian (Gärdenfors, chapter 1), and where no rotation is taken out d is a weighted Euclidean
     metric. The best rotation within a bounded angle may break the triangle inequality. The recognizer's arithmetic mean
     says who is who, but beyond the nearest all are equally far; a space needs distances that go on growing. So only
-    representations that are compared sample by sample count: the others are not metrics.
+    representations that are compared sample by sample count: the others are not metrics. The widths sigma_r are the
+    median distances of the prototypes, so that all representations matter alike.
 
     Parameters
     ----------
@@ -114,8 +114,6 @@ def conceptual_space(
         One for each symbol: its medoid, say.
     like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose representations and invariances to take.
-    widths : array_like of shape (R,), optional
-        By default the median distance of the prototypes in each representation, so that all of them matter alike.
 
     Raises
     ------
@@ -130,13 +128,9 @@ def conceptual_space(
             f"{len(names)} symbols, {len(set(names))} of them different"
         )
     n_rows = len(described.blocks)
-    if widths is None:
-        widths = median_distances(described)
-        widths = np.where(widths > 0, widths, 1.0)  # where the prototypes do not differ
-    sigma = np.asarray(widths, dtype=np.float64)
-    averaged(described, sigma)  # refuses widths of another number
+    widths = median_distances(described)[:n_rows]
     described = described.select(range(n_rows))
-    similarity = averaged(described, sigma[:n_rows])
+    similarity = averaged(described, np.where(widths > 0, widths, 1.0))  # 0 where the prototypes do not differ
     d = np.sqrt(np.maximum(-2.0 * similarity.log_average(described, described), 0.0))
     d = 0.5 * (d + d.T)
     np.fill_diagonal(d, 0.0)
@@ -167,7 +161,14 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     SpecificationError
         Different specifications, or shares that are not between 0 and 1.
     """
-    _check_pair(a, b)
+    for symbol in (a, b):
+        check_primitives(symbol)
+        if len(symbol) != 1:
+            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
+    if a.n_dims != b.n_dims:
+        raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
+    if a.dmp != b.dmp:
+        raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
     s = np.atleast_1d(np.asarray(shares, dtype=np.float64))
     if s.ndim != 1 or not ((s >= 0) & (s <= 1)).all():
         raise SpecificationError(f"expected shares of the way from 0 to 1, got {shares!r}")
@@ -190,17 +191,6 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     theta[:, :, -3:-1] += shifts[:, :, None]
     durations = a.durations * (b.durations / a.durations) ** s
     return from_numbers(a.dmp, theta, durations)
-
-
-def _check_pair(a: Primitives, b: Primitives) -> None:
-    for symbol in (a, b):
-        check_primitives(symbol)
-        if len(symbol) != 1:
-            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
-    if a.n_dims != b.n_dims:
-        raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
-    if a.dmp != b.dmp:
-        raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
 
 
 def _part_rotation(R: Array, s: Array) -> Array:

@@ -70,9 +70,7 @@ class Rest:
     min_movement: float | None = None
 
     def __post_init__(self) -> None:
-        check_number("speed", self.speed, above=0.0)
-        if self.speed >= 0.5:
-            raise SpecificationError(f"expected speed to be a share of the peak speed below 0.5, got {self.speed!r}")
+        check_number("speed", self.speed, above=0.0, below=0.5)
         for name in ("min_rest", "min_movement"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), least=0.0)
@@ -153,9 +151,7 @@ class SpeedMinima:
 
     def __post_init__(self) -> None:
         for name in ("depth", "span"):
-            check_number(name, getattr(self, name), above=0.0)
-            if getattr(self, name) >= 1:
-                raise SpecificationError(f"expected {name} to be a share below 1, got {getattr(self, name)!r}")
+            check_number(name, getattr(self, name), above=0.0, below=1.0)
         if self.turn is not None:
             check_number("turn", self.turn, above=0.0)
             if self.turn >= np.pi:

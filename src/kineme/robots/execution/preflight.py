@@ -207,7 +207,8 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     gripper. What changes in motion as it was generated passes; the fastest of these is said, without a limit.
     """
     name, sent = generated.name, trajectory.steps[generated.name]
-    before, now = _changes(generated.values), _changes(sent)
+    # The samples from which another value holds.
+    before, now = (np.flatnonzero(np.diff(values)) + 1 for values in (generated.values, sent))
     if not np.array_equal(generated.values[[0, *before]], sent[[0, *now]]):
         return Check("steps", name, 0.0, len(now), len(before), "changes", False, math.inf)
     if len(now) == 0:
@@ -221,11 +222,6 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     limit, unit = (math.nan, "of the velocity limit, moving") if moving else (_STANDING, "of the velocity limit")
     at, slower = float(trajectory.times[now[worst]]), 1.0 if passed else math.inf
     return Check("steps", name, at, float(shares[worst]), limit, unit, passed, slower)
-
-
-def _changes(values: Array) -> NDArray[np.intp]:
-    """Indices of the samples from which another value holds."""
-    return np.flatnonzero(np.diff(values)) + 1
 
 
 class Check(NamedTuple):
