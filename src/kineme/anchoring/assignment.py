@@ -83,10 +83,6 @@ def assign(
         Movements of a proposal, at least. On average they are more similar than half way from the members of one
         symbol, which are 1, to those of the nearest other, 0.
 
-    Returns
-    -------
-    Assignment
-
     Raises
     ------
     SpecificationError

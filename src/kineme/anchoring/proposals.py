@@ -269,10 +269,6 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
         its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
         default 2000; with the other methods 5000, in space 800.
 
-    Returns
-    -------
-    Proposals
-
     Raises
     ------
     SpecificationError

@@ -230,10 +230,6 @@ class ActionLibrary:
         progress : callable, optional
             Called after every batch with the number of movements done and of all.
 
-        Returns
-        -------
-        LearnReport
-
         Raises
         ------
         TrajectoryError

@@ -277,35 +277,20 @@ def as_dict(
     return {"movements": len(shards), "candidates": candidates, "answers": listed}
 
 
-def open_shards(folder: str | Path, progress: Callable[[int, int], object] | None = None) -> Shards:
+def open_shards(folder: str | Path) -> Shards:
     """Open the shards in a folder, which `kineme features` has written, for searching.
 
     What is needed to search fast is made at the first search, some seconds for a million movements, and kept beside
-    the shards in folders ``search-...``.
-
-    Parameters
-    ----------
-    folder : str or Path
-    progress : callable, optional
-        Called with the number of shards that are open, and of all.
-
-    Raises
-    ------
-    DataError
-        No shards, damaged ones, or some of other bases or of another library.
+    the shards in folders ``search-...``. Raises `DataError`: no shards, damaged ones, or some of other bases or of another
+    library.
     """
     load_compiled()  # so that answers do not depend on what was computed before
     place = Path(folder)
     reduction = read_reduction(place)
-    paths = sorted(place.glob(PATTERN))
-    shards = []
-    for path in paths:
-        shards.append(open_shard(path, reduction))
-        if progress is not None:
-            progress(len(shards), len(paths))
+    shards = [open_shard(path, reduction) for path in sorted(place.glob(PATTERN))]
     if not any(map(len, shards)):
         raise DataError(
-            f"expected shards of movements in {place}, got {len(paths)} files {PATTERN} without any; write them by: "
+            f"expected shards of movements in {place}, got {len(shards)} files {PATTERN} without any; write them by: "
             f"kineme features ARCHIVE --library LIBRARY -o {place}"
         )
     return Shards(place, reduction, tuple(shard for shard in shards if len(shard)))

@@ -115,12 +115,6 @@ class Recordings(MovementSequence):
         files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
         return f"Recordings({self.demonstrations!r}, {files}, {problems})"
 
-    def without_labels(self) -> Recordings:
-        """Return the same movements, with no label on any."""
-        plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
-        sources = tuple(source._replace(label=None) for source in self.sources)
-        return replace(self, demonstrations=plain, sources=sources)
-
 
 def merge_files(
     files: Sequence[FileRead],
