@@ -494,7 +494,7 @@ def test_in_the_shell(table, folder, tmp_path):
     stops = shell(folder, path, "--simulate", "--stop-at-each-step", "--disturb", "tray:gone@7.5", "--json")
     assert [attempt["how"] for attempt in json.loads(stops.stdout)["attempts"]] == ["planned"] * 3
     assert "--simulate" in shell(folder, path, "--disturb", "cup:gone@1").output
-    assert "a new folder" in shell(folder, path, "-o", tmp_path / "x.json").output
+    assert "expected a folder" in shell(folder, path, "-o", tmp_path / "x.json").output
 
 
 @pytest.mark.parametrize("text", ["", "[" * 5000, '{"format": "kineme-plan"}', '{"format": "other"}', "\udc80"])

@@ -39,6 +39,13 @@ def check_new(
     """
     if path is None or str(path) == "-":
         return
+    if path.exists() and any(Path(source).exists() and path.samefile(source) for source in inputs):
+        raise click.UsageError(f"expected another file to write than the input {printable(path)}")
+    around = [source for source in inputs if Path(source).is_dir() and Path(source).resolve() in path.resolve().parents]
+    if path.is_file() and around:
+        raise click.UsageError(
+            f"expected another file to write than {printable(path)}, one of the input {printable(around[0])}"
+        )
     if endings:
         if path.suffix.lower() not in endings:
             expected = ", ".join(ending or "a folder" for ending in endings)
@@ -54,19 +61,8 @@ def check_new(
                 f"expected a folder that can be written, {printable(parent)} is read-only; allow writing there, or "
                 "choose another folder"
             )
-        return
-    if any(Path(source).exists() and path.samefile(source) for source in inputs):
-        raise click.UsageError(f"expected another file to write than the input {printable(path)}")
-    if path.is_file() and (inside := next((source for source in inputs if _holds(source, path)), None)) is not None:
-        raise click.UsageError(
-            f"expected another file to write than {printable(path)}, one of the input {printable(inside)}"
-        )
     if not force and path.is_file():
         raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")
-
-
-def _holds(source: str | Path, path: Path) -> bool:
-    return Path(source).is_dir() and Path(source).resolve() in path.resolve().parents
 
 
 def write_bytes(data: bytes) -> None:

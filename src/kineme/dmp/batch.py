@@ -185,7 +185,15 @@ class Batch:
         arrays = {name: self.row(name) for name in self.ROWS}
         if self.recorded_as is not None and self.recorded_as.steps is not None:
             arrays |= {name: getattr(self.recorded_as.steps, field) for name, field in _STEPS_OF.items()}
-        header = header_of(self.dmp, self.labels, self.names, self.channels)
+        plain = None if self.labels is None else np.asarray(self.labels).tolist()
+        if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
+            raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
+        header = {
+            "dmp": specification_to_dict(self.dmp),
+            "labels": plain,
+            "names": None if self.names is None else list(self.names),
+            "channels": None if self.channels is None else channels_to_data(self.channels),
+        }
         return write_container(Path(path), self.KIND, header, arrays)
 
     @classmethod
@@ -236,19 +244,6 @@ class Batch:
             None if names is None else tuple(names),
             about,
         )
-
-
-def header_of(dmp: Any, labels: NDArray[Any] | None, names: Names, channels: Channels | None) -> dict[str, Any]:
-    """Specification, labels, names and channels of a batch as plain data."""
-    plain = None if labels is None else np.asarray(labels).tolist()
-    if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
-        raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
-    return {
-        "dmp": specification_to_dict(dmp),
-        "labels": plain,
-        "names": None if names is None else list(names),
-        "channels": None if channels is None else channels_to_data(channels),
-    }
 
 
 def recorded_as_from(header: dict[str, Any], arrays: Arrays, n: int, n_dims: int) -> RecordedAs | None:

@@ -281,8 +281,8 @@ def open_shards(folder: str | Path) -> Shards:
     """Open the shards in a folder, which `kineme features` has written, for searching.
 
     What is needed to search fast is made at the first search, some seconds for a million movements, and kept beside
-    the shards in folders ``search-...``. Raises `DataError`: no shards, damaged ones, or some of other bases or of another
-    library.
+    the shards in folders ``search-...``. Raises `DataError`: no shards, damaged ones, or some of other bases or of
+    another library.
     """
     load_compiled()  # so that answers do not depend on what was computed before
     place = Path(folder)

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -106,7 +106,13 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
         more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
-        _check_units(cells, dict(zip(axes, units, strict=True)))
+        unit_of = dict(zip(axes, units, strict=True))
+        for head in cells:
+            unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
+            if unit is not None and other is not None and unit != other:
+                raise DataError(
+                    f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
+                )
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
     return States(ids, symbols, axes, tuple(columns), before, after, words)
@@ -197,16 +203,6 @@ def _column(head: str) -> str:
     stem, _, axis = name.rpartition("_")
     axis = axis.lower() if axis in ("X", "Y", "Z") else axis
     return f"{HAND}_{axis}" if stem.lower() in _HANDS else f"{stem}_{axis}" if stem else axis
-
-
-def _check_units(heads: Iterable[str], unit_of: Mapping[str, str | None]) -> None:
-    """Refuse a position in another unit than that of its axis in the recordings, where both are said."""
-    for head in heads:
-        unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
-        if unit is not None and other is not None and unit != other:
-            raise DataError(
-                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
-            )
 
 
 def _matched(

@@ -206,7 +206,19 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     at_full_turn = (length < rotations.TINY) & (w < 0)
     principal = np.where(at_full_turn, signed[:, None] * axis, rotations.logarithm_factor(w, length) * v)
     p = principal + (4.0 * np.pi * turns)[:, None] * axis
-    _check_continuous(p, q, offsets, where)
+    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    steps[offsets[1:-1] - 1] = 0.0
+    suspects = np.flatnonzero(steps > _SLACK)
+    turned = rotations.angle_between(q[suspects], q[suspects + 1])
+    broken = steps[suspects] > _SLACK + _STRETCH * turned
+    if broken.any():
+        k = int(np.argmax(broken))
+        row = int(suspects[k])
+        raise TrajectoryError(
+            f"{where(row)}: expected orientations within a full turn of the goal, or turning about one fixed axis "
+            f"beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad to the next sample while the "
+            f"orientation turns by {turned[k]:.3g} rad; split the movement there"
+        )
     return p
 
 
@@ -225,22 +237,6 @@ def _axes(v: Array, length: Array, offsets: NDArray[np.intp], movement: NDArray[
     chosen = np.where(before >= offsets[movement], before, after)
     chosen = np.where(chosen < offsets[movement + 1], chosen, rows)  # no sample of this movement has an axis
     return v[chosen] / np.where(clear[chosen], length[chosen, 0], 1.0)[:, None]
-
-
-def _check_continuous(p: Array, q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> None:
-    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
-    steps[offsets[1:-1] - 1] = 0.0
-    suspects = np.flatnonzero(steps > _SLACK)
-    turned = rotations.angle_between(q[suspects], q[suspects + 1])
-    broken = steps[suspects] > _SLACK + _STRETCH * turned
-    if broken.any():
-        k = int(np.argmax(broken))
-        row = int(suspects[k])
-        raise TrajectoryError(
-            f"{where(row)}: expected orientations within a full turn of the goal, or turning about one fixed axis "
-            f"beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad to the next sample while the "
-            f"orientation turns by {turned[k]:.3g} rad; split the movement there"
-        )
 
 
 def angular_velocity(p: ArrayLike, p_rate: ArrayLike) -> Array:

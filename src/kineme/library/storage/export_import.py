@@ -60,7 +60,15 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
             with closing(Store(Path(checked) / sqlite.FILE, read_only=True, wait=wait)) as store:
                 return move_in(store, location)
     target = location / sqlite.FILE
-    _check_file(source)
+    if not source.is_file():
+        got = "something else" if source.exists() else "no file"
+        raise DataError(f"expected an exported library at {source}, found {got} there")
+    for log in (source.with_name(source.name + end) for end in sqlite.LOGS):
+        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
+            raise DataError(
+                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
+                "import that file"
+            )
     location.mkdir(parents=True, exist_ok=True)
     sqlite.check_alone(target)
     with _new(target) as beside:
@@ -79,19 +87,6 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
                 copy.execute("PRAGMA journal_mode = WAL")
             _check(beside, source, wait)
     return target
-
-
-def _check_file(source: Path) -> None:
-    """Refuse anything but one complete file."""
-    if not source.is_file():
-        got = "something else" if source.exists() else "no file"
-        raise DataError(f"expected an exported library at {source}, found {got} there")
-    for log in (source.with_name(source.name + end) for end in sqlite.LOGS):
-        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
-            raise DataError(
-                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
-                "import that file"
-            )
 
 
 def _check_structure(beside: Path, source: Path, wait: float) -> None:

@@ -69,18 +69,6 @@ def preflight(
     TrajectoryError
         A trajectory of other joints, of numbers that are not finite, or whose times do not increase.
     """
-    _check_numbers(robot, trajectory)
-    times = dense_times(robot, trajectory)
-    dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
-    state = along(robot, dense)
-    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
-    checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
-    if path is not None:
-        checks += tracking(robot, trajectory, path, follow, (times, state))
-    return Preflight(tuple(checks), tuple(_unchecked(robot)))
-
-
-def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
     shape = (max(2, len(trajectory)), robot.n_joints)
     arrays = {name: getattr(trajectory, name) for name in ("positions", "velocities", "accelerations")}
     for name, values in arrays.items():
@@ -89,6 +77,14 @@ def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
     finite = all(np.isfinite(values).all() for values in (trajectory.times, *arrays.values()))
     if not finite or not np.all(np.diff(trajectory.times) > 0):
         raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
+    times = dense_times(robot, trajectory)
+    dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
+    state = along(robot, dense)
+    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
+    checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
+    if path is not None:
+        checks += tracking(robot, trajectory, path, follow, (times, state))
+    return Preflight(tuple(checks), tuple(_unchecked(robot)))
 
 
 def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
