@@ -334,7 +334,6 @@ def _findings(
     flagged: NDArray[np.bool_],
     tasks: calibrate.Groups,
 ) -> tuple[Finding, ...]:
-    """Return the findings, in their order."""
     order = np.lexsort((-ranking.evidence, ~broken))
     listed = order[flagged[order]]
     if not (flagged & ~broken).any():

@@ -58,20 +58,26 @@ class Evidence(NamedTuple):
 
 @dataclass(frozen=True)
 class Operator:
-    """One symbol as an action of a planner."""
+    """One symbol as an action of a planner.
+
+    - `duration`: median [s]. `displacement` (2, k): least and largest way of the hand.
+    - `begin`, `end` (k,): hand minus the first place at the start, and minus the last place at the end; medians.
+    - `cannot_tell`: what the states do not decide.
+    - `usable`: whether a planner gets it; not if an effect came after some movements and not after others.
+    """
 
     name: str
     symbol_id: str
     parameters: tuple[Parameter, ...]
     preconditions: tuple[Literal, ...]
     effects: tuple[Literal, ...]
-    duration: float  # median [s]
-    begin: tuple[float, ...]  # (k,) median of the hand minus the first place at the start
-    end: tuple[float, ...]  # (k,) median of the hand minus the last place at the end
-    displacement: tuple[tuple[float, ...], tuple[float, ...]]  # (2, k) least and largest way of the hand
+    duration: float
+    begin: tuple[float, ...]
+    end: tuple[float, ...]
+    displacement: tuple[tuple[float, ...], tuple[float, ...]]
     evidence: tuple[Evidence, ...]
-    cannot_tell: tuple[str, ...]  # what the states do not decide
-    usable: bool  # whether a planner gets it: not if an effect came after some movements and not after others
+    cannot_tell: tuple[str, ...]
+    usable: bool
     movements: tuple[int, ...]
 
     @property
@@ -269,7 +275,6 @@ def _is_of(value: Any, hint: Any) -> bool:
 
 
 def _positions(domain: Domain) -> list[Sequence[float]]:
-    """List the positions that a domain holds."""
     positions: list[Sequence[float]] = [
         *domain.places.values(),
         *(each.typical for each in domain.vocabulary.variables if each.typical),

@@ -22,17 +22,21 @@ _GRIPPERS = ("grip", "grasp", "finger")
 
 @dataclass(frozen=True, eq=False)
 class Skill:
-    """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move."""
+    """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move.
+
+    - `movements` (n,): their ids in the library. `starts`, `goals` (n, k). `durations` (n,) [s].
+    - `axes`, `units`: names of the k coordinates and their units, None where the recordings do not say it.
+    """
 
     name: str
     id: str
     description: str
-    movements: NDArray[np.int64]  # (n,) their ids in the library
-    starts: Array  # (n, k)
-    goals: Array  # (n, k)
-    durations: Array  # (n,) [s]
-    axes: tuple[str, ...]  # names of the k coordinates
-    units: tuple[str | None, ...]  # of each, None where the recordings do not say it
+    movements: NDArray[np.int64]
+    starts: Array
+    goals: Array
+    durations: Array
+    axes: tuple[str, ...]
+    units: tuple[str | None, ...]
 
     @property
     def shown(self) -> dict[str, Array]:

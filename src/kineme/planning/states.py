@@ -41,16 +41,19 @@ State = Mapping[str, Any]
 class States:
     """States before and after n movements, in c columns.
 
-    The columns ``hand_x`` ... are where the hand is. NaN is not known; a word is its number in the words of its column.
+    - `movements` (n,): ids in the library. `symbols`: the symbol of each.
+    - `axes`: k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are
+      where the hand is.
+    - `before`, `after` (n, c): NaN is not known; a word is its number in `words` of its column.
     """
 
-    movements: NDArray[np.int64]  # (n,) ids in the library
-    symbols: tuple[str, ...]  # of each movement
-    axes: tuple[str, ...]  # k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``
+    movements: NDArray[np.int64]
+    symbols: tuple[str, ...]
+    axes: tuple[str, ...]
     columns: tuple[str, ...]
-    before: Array  # (n, c)
-    after: Array  # (n, c)
-    words: Mapping[str, tuple[str, ...]]  # of the columns that have some
+    before: Array
+    after: Array
+    words: Mapping[str, tuple[str, ...]]
 
     def __len__(self) -> int:
         return len(self.movements)

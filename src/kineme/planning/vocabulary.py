@@ -340,14 +340,12 @@ def _facts_of_items(vocabulary: Vocabulary, state: State, places: Mapping[str, A
 
 
 def _predicates(variable: Variable) -> list[str]:
-    """List the predicates that a column tells."""
     if variable.kind == "word":
         return [f"{variable.name}-{word}" for word in variable.words]
     return [variable.name]
 
 
 def _flags(vocabulary: Vocabulary, variable: Variable, state: State) -> dict[Fact, bool]:
-    """Return the facts that one flag or word tells."""
     arguments = (variable.owner,) if variable.owner else ()
     value = state.get(variable.columns[0])
     if value is None or (isinstance(value, float) and np.isnan(value)):

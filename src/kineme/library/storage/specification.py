@@ -79,7 +79,6 @@ class Specification:
         return Recognizer(**self._parameters())
 
     def _parameters(self) -> dict[str, Any]:
-        """Return the parameters of that recognizer."""
         how = self.comparison
         return {
             "representations": how.representations,

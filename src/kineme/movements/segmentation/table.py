@@ -107,7 +107,6 @@ class Rest:
         return bouts, lasting >= least
 
     def _without_pauses(self, bouts: Rows, motion: Motion) -> Rows:
-        """Bouts merged across pauses."""
         if self.min_rest is not None:
             return merge_across(bouts, motion.times, self.min_rest)
         for _ in range(_ROUNDS):

@@ -344,7 +344,6 @@ def _library(studio: Studio) -> dict[str, Any]:
 
 
 def _listed(studio: Studio, ids: read.Ids) -> list[dict[str, Any]]:
-    """Movements with thumbnails."""
     if not len(ids):
         return []
     store, symbol_of = studio.library.store, studio.view().symbol_of
