@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.anchoring.proposals import Proposal, Proposals, check_members
-from kineme.anchoring.scaling import classical_scaling
-from kineme.anchoring.space import ConceptualSpace
+from kineme.anchoring.space import ConceptualSpace, classical_scaling
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
