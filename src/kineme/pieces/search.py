@@ -103,23 +103,11 @@ class Shards:
         remove_others(self.folder, *self.plan, self.reduction, groups)
 
     def nearest(self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES) -> list[list[Near]]:
-        """Return the nearest of all movements to each of some.
+        """Return the `n` nearest of all movements to each of some in the columns of the library.
 
-        Parameters
-        ----------
-        movements : MovementsLike
-            In the columns of the library, see `Demonstrations.of`.
-        n : int, default 10
-            How many for each, nearest first; of equally near ones the first by path, place and start.
-        candidates : int, default 256
-            How many are compared by all representations; at least n.
-
-        Raises
-        ------
-        TrajectoryError
-            Movements of other columns than those of the library.
-        DataError
-            Feature rows that are damaged.
+        The nearest is first; of equally near ones the first by path, place and start. At least n `candidates` are
+        compared by all representations. Raises `TrajectoryError`: movements of other columns than those of the library.
+        Raises `DataError`: feature rows that are damaged.
         """
         check_count("n", n, 1, most=MOST_CANDIDATES)
         check_count("candidates", candidates, n, most=MOST_CANDIDATES)

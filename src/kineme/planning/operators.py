@@ -64,25 +64,15 @@ def learn_operators(
 ) -> Domain:
     """Learn an operator for each symbol of a library from the states before and after its movements; see the module.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-    table : str, Path or mapping, optional
-        States beside the recordings; see `states_of`. Without it, the hand and the grippers of the recordings alone.
-    radius : float, optional
-        Of places, in the unit of the recordings; by default where distances of the hand from objects part into near
-        and far, see `vocabulary_of`.
-    error_rate : float, default 0.02
-        Share of facts that a sensor gets wrong; 0 takes each fact as it is.
-    edits : sequence of Edit, optional
-        Of a person, as those of an earlier domain.
+    - `table`: states beside the recordings, see `states_of`; without it the hand and the grippers of the recordings
+      alone.
+    - `radius`: of places, in the unit of the recordings; by default where distances of the hand from objects part into
+      near and far, see `vocabulary_of`.
+    - `error_rate`: share of facts that a sensor gets wrong; 0 takes each fact as it is.
+    - `edits`: of a person, as those of an earlier domain.
 
-    Raises
-    ------
-    DataError
-        A table that is none, or rows that belong to no movement.
-    SpecificationError
-        No symbol has movements; a radius or an error rate out of range.
+    Raises `DataError`: a table that is none, or rows that belong to no movement. Raises `SpecificationError`: no symbol
+    has movements; a radius or an error rate out of range.
     """
     states = states_of(library, table)
     durations = library.primitives(ids=states.movements).durations

@@ -63,21 +63,13 @@ class Plan:
 def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.0) -> Plan:
     """Find a plan by a planner of unified-planning, and check each of its steps.
 
-    Parameters
-    ----------
-    problem : Problem
-    planner : str, optional
-        Name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the problem as it
-        is, else one that takes it without costs and negative preconditions.
-    timeout : float, default 30.0
-        [s], half of it with costs.
+    - `planner`: name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the
+      problem as it is, else one that takes it without costs and negative preconditions.
+    - `timeout`: [s], half of it with costs.
 
-    Raises
-    ------
-    SpecificationError
-        There is no plan, with the goals that no order of operators reaches; or a step depends on what is not known.
-    DataError
-        The extra ``planner`` is not installed, no engine takes the problem, or none finds a plan in time.
+    Raises `SpecificationError`: there is no plan, with the goals that no order of operators reaches; or a step depends
+    on what is not known. Raises `DataError`: the extra ``planner`` is not installed, no engine takes the problem, or
+    none finds a plan in time.
     """
     check_number("timeout", timeout, least=0.1)
     if all(problem.facts.get(goal.fact) is goal.value for goal in problem.goal):

@@ -55,20 +55,11 @@ def problem_of(
 ) -> Problem:
     """Return a problem.
 
-    Parameters
-    ----------
-    domain : Domain
-    state : mapping of str to number or word
-        The state now, in the columns of the states that the domain was learned from.
-    goal : str or iterable of Goal
-        A conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
-    places : mapping of str to (k,) positions, optional
-        More places, by name.
+    - `state`: the state now, in the columns of the states that the domain was learned from; numbers and words.
+    - `goal`: facts, or a conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
+    - `places`: positions (k,) of more places, by name.
 
-    Raises
-    ------
-    SpecificationError
-        Names that the domain does not have, or a place without a position.
+    Raises `SpecificationError`: names that the domain does not have, or a place without a position.
     """
     named = {name: np.array(where) for name, where in domain.places.items()}
     for name, where in (places or {}).items():

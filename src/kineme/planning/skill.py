@@ -108,13 +108,8 @@ def is_gripper(name: str) -> bool:
 def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0) -> list[Excess]:
     """List what lies outside the box of starts, goals and displacements that were shown; empty if nothing does.
 
-    Parameters
-    ----------
-    skill : Skill
-    start, goal : array_like of shape (k,)
-        Places, in the unit of the recordings.
-    margin : float, default 0.0
-        By which the boxes are larger on every side, in that unit.
+    Start and goal (k,) are places in the unit of the recordings. The boxes are larger by `margin` on every side, in
+    that unit.
     """
     check_number("margin", margin, least=0.0)
     begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)

@@ -76,18 +76,11 @@ class Question(NamedTuple):
 class SkillTools:
     """The tools over the skills of a library, as plain data; `skills_server` serves them.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-        Nothing in it is changed. Changes by others are visible at the next call.
-    robot : Robot
-    execute : callable, optional
-        Executes a movement that was approved, ``execute(name, movement)``, and returns a sentence that says what was
-        done. Without it no tool exists that moves anything.
-    joints : array_like of shape (n,), optional
-        Where the joints stand at first; by default the rest posture. Then where the last movement has ended.
-    symbols : sequence of str, optional
-        Names or ids of the symbols that are offered; by default all that have movements.
+    - `library`: nothing in it is changed. Changes by others are visible at the next call.
+    - `execute`: executes a movement that was approved, ``execute(name, movement)``, and returns a sentence that says
+      what was done. Without it no tool exists that moves anything.
+    - `joints` (n,): where they stand at first, by default in the rest posture; then where the last movement has ended.
+    - `symbols`: names or ids of the symbols that are offered; by default all that have movements.
     """
 
     def __init__(

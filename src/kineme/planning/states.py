@@ -65,22 +65,14 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     Where the hand is, and discrete channels as of a gripper, come from the recordings. The table adds what else is
     known: positions of objects (``cup_x, cup_y, cup_z``, in the frame and unit of the recordings), flags and words.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-    table : str, Path, or mapping of column to n values (as a data frame), optional
-        A file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, with a row for
-        each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or with
-        ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the last row
-        up to a movement's start, the one after the first row from its end on, each within a twentieth of its duration.
-        Empty cells are not known.
+    It is a file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, or a mapping of
+    column to n values, as a data frame; with a row for each moment. Either it has the columns ``movement`` (id, or
+    file) and ``moment`` (before or after); or ``time``, in the clock of the recordings, and ``file`` where there are
+    several: the state before is the last row up to a movement's start, the one after the first row from its end on,
+    each within a twentieth of its duration. Empty cells are not known.
 
-    Raises
-    ------
-    DataError
-        A file that is no table, or rows that belong to no movement.
-    SpecificationError
-        No symbol has movements.
+    Raises `DataError`: a file that is no table, or rows that belong to no movement. Raises `SpecificationError`: no
+    symbol has movements.
     """
     ids = np.concatenate([symbol.members for symbol in library.symbols()] or [np.empty(0, np.int64)])
     if not len(ids):

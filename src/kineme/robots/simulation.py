@@ -395,15 +395,8 @@ def brake(robot: Robot, trajectory: JointTrajectory, at: float) -> JointTrajecto
 
     The path is passed slower and slower: with ``x = t / r``, ``ds/dt = 1 - 3 x^2 + 2 x^3``, so it is left nowhere, and
     what was checked of it holds. r is the least of a series of seconds, each 1.25 times the one before, with which the
-    limits hold; where the trajectory ends sooner than that, it is its remainder.
-
-    Parameters
-    ----------
-    robot : Robot
-    trajectory : JointTrajectory
-        One that passed its checks.
-    at : float
-        Time [s] of the trajectory at which the brake begins: time 0 of what is returned.
+    limits hold; where the trajectory ends sooner than that, it is its remainder. The trajectory has passed its checks,
+    and `at` [s] is its time at which the brake begins: time 0 of what is returned.
     """
     check_number("at", at, least=0.0, most=trajectory.duration)
     ramp, torques = _FIRST_RAMP, Torques(robot)

@@ -78,7 +78,6 @@ class Step(Protocol):
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements after this step."""
-        ...
 
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:

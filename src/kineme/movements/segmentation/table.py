@@ -294,15 +294,12 @@ class Segmenter(Protocol):
     @property
     def resolution(self) -> float:
         """Share of the peak speed that has to be told from rest."""
-        ...
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, none at the ends."""
-        ...
 
     def pieces(self, motion: Motion) -> Rows:
         """The piece of each movement, rows (n, 2), disjoint and in order; `segment` narrows them to their motion."""
-        ...
 
 
 #: Name -> method.
