@@ -34,15 +34,10 @@ _REACH = 0.6  # share of the typical distance to another symbol, where no two mo
 class Assignment:
     """Names of new movements, and proposals for the others.
 
-    Attributes
-    ----------
-    labels : ndarray of n labels or None
-        The symbol that each movement is assigned to; None is unknown.
-    p_values : ndarray of shape (n,)
-        The largest conformal p-value of each movement for any symbol.
-    proposals : Proposals
-        Clusters of unknown movements; members are indices of the new movements. `clusters` is -1 for movements that are
-        assigned to a symbol or stay unknown.
+    - `labels`: the symbol that each movement is assigned to; None is unknown.
+    - `p_values` (n,): the largest conformal p-value of each movement for any symbol.
+    - `proposals`: clusters of unknown movements; members are indices of the new movements. `clusters` is -1 for
+      movements that are assigned to a symbol or stay unknown.
     """
 
     labels: NDArray[np.object_]

@@ -43,10 +43,7 @@ class Between(NamedTuple):
 class ConceptualSpace:
     """Symbols at distances; made by `conceptual_space`.
 
-    Attributes
-    ----------
-    symbols : tuple
-    distances : ndarray of shape (s, s)
+    - `distances` (s, s).
     """
 
     symbols: tuple[Any, ...]

@@ -60,22 +60,13 @@ MESSAGES = {
 class ArmState(NamedTuple):
     """An arm after one step of live control.
 
-    Attributes
-    ----------
-    joints : ndarray of shape (n,)
-        What to send now [rad, m].
-    velocities : ndarray of shape (n,)
-        Of the joints during this step, per second: constant in it.
-    accelerations : ndarray of shape (n,)
-        Change of the velocities since the last step, per second squared.
-    torques : ndarray of shape (n,)
-        What that takes by the model [Nm, N], without friction and load; nan where it knows no masses.
-    distance : float
-        Of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
-    status : ArmStatus
-        Whether the arm follows, and which limits hold it back.
-    movement : State
-        Of the movement; see `kineme.control.State`.
+    - `joints` (n,): what to send now [rad, m].
+    - `velocities` (n,): of the joints during this step, per second: constant in it.
+    - `accelerations` (n,): change of the velocities since the last step, per second squared.
+    - `torques` (n,): what that takes by the model [Nm, N], without friction and load; nan where it knows no masses.
+    - `distance`: of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
+    - `status`: whether the arm follows, and which limits hold it back.
+    - `movement`: of the movement; see `kineme.control.State`.
     """
 
     joints: Array

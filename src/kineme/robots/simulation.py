@@ -38,24 +38,14 @@ Watch = Callable[[float, Array], bool]
 class Run:
     """A movement as the simulated arm made it, T samples, 100 of them in a second.
 
-    Attributes
-    ----------
-    times : ndarray of shape (T,)
-        Since the movement began [s], below 0 in the approach; at its end the arm stands for 0.2 s at least.
-    joints : ndarray of shape (T, n)
-        As measured [rad, m].
-    sent : ndarray of shape (T, n)
-        Where they were sent.
-    tips : ndarray of shape (T, 3)
-        As measured [m].
-    objects : dict of str to ndarray of shape (T, 3)
-        Where each object was [m]; nan where it was gone.
-    stopped : float or None
-        When `watch` stopped the arm [s]; None where it came to the end.
-    tip_error, joint_error : float
-        Largest distance from what was sent, of the tip [m] and of any joint [rad, m].
-    effort : float
-        Largest torque of any joint, as a share of its limit; nan where none is known.
+    - `times` (T,): since the movement began [s], below 0 in the approach; at its end the arm stands for 0.2 s at least.
+    - `joints` (T, n): as measured [rad, m].
+    - `sent` (T, n): where they were sent.
+    - `tips` (T, 3): as measured [m].
+    - `objects`: name -> where it was (T, 3) [m]; nan where it was gone.
+    - `stopped`: when `watch` stopped the arm [s]; None where it came to the end.
+    - `tip_error`, `joint_error`: largest distance from what was sent, of the tip [m] and of any joint [rad, m].
+    - `effort`: largest torque of any joint, as a share of its limit; nan where none is known.
     """
 
     times: Array

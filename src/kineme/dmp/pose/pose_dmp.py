@@ -115,16 +115,11 @@ class PoseDMP:
 class PosePrimitives(Batch):
     """n primitives of orientations or poses; made by `PoseDMP.learn`.
 
-    Attributes
-    ----------
-    tangent : Primitives
-        Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
-        weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and angles
-        and k orientations it has p + 3 k.
-    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
-        The demonstrated goal orientations, where the rotation vectors are 0.
-    recorded_as : RecordedAs or None
-        Channels of the recordings, where they are known; see `channels`.
+    - `tangent`: of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before
+      it. Its weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and
+      angles and k orientations it has p + 3 k.
+    - `references` (n, 4): the demonstrated goal orientations, where the rotation vectors are 0.
+    - `recorded_as`: channels of the recordings, where they are known; see `channels`.
     """
 
     ROWS = Primitives.ROWS | {"references": "nq"}

@@ -43,19 +43,14 @@ class AveragePrimitive:
     With ``theta = [W, x0, g, tau v0]``, the ``d (N + 3)`` numbers that a path depends on linearly, the covariance is
     ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
 
-    Attributes
-    ----------
-    primitive : Primitives
-        The mean, a batch of one: roll it out, describe it, control with it as with any other. It knows nothing of the
-        covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points as the
-        demonstrations would.
-    factor : ndarray of shape (r, d, N + 3)
-        Centered, weighted deviations of theta from the mean; r is at most n and at most d (N + 3).
-    tempo_factor : ndarray of shape (r,)
-        The same for ln tau.
-    noise : float or None
-        Standard deviation of a path, at each time, around what the factor explains: how far each demonstration is from
-        the nearest weighted mean of the others. None where there are too few demonstrations to say, or too many.
+    - `primitive`: the mean, a batch of one: roll it out, describe it, control with it as with any other. It knows
+      nothing of the covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points
+      as the demonstrations would.
+    - `factor` (r, d, N + 3): centered, weighted deviations of theta from the mean; r is at most n and at most d (N +
+      3).
+    - `tempo_factor` (r,): the same for ln tau.
+    - `noise`: standard deviation of a path, at each time, around what the factor explains: how far each demonstration
+      is from the nearest weighted mean of the others. None where there are too few demonstrations to say, or too many.
     """
 
     primitive: Primitives

@@ -67,18 +67,11 @@ class Recordings(MovementSequence):
 
     A sequence of `Trajectory`, taken wherever movements are expected.
 
-    Attributes
-    ----------
-    demonstrations : Demonstrations
-        The movements of the most frequent number of dimensions (of two equally frequent, the one met first); those
-        of other dimensions are among the problems. They carry labels if every one of them has one.
-    sources : tuple of Source
-        One per movement.
-    problems : tuple of Problem
-    detected : tuple of (Detected, int)
-        How files were understood, and how many in this way; most frequent first.
-    notes : tuple of str
-        What else a person should know of how they were read.
+    - `demonstrations`: the movements of the most frequent number of dimensions (of two equally frequent, the one met
+      first); those of other dimensions are among the problems. They carry labels if every one of them has one.
+    - `sources`: one per movement.
+    - `detected`: how files were understood, and how many in this way; most frequent first.
+    - `notes`: what else a person should know of how they were read.
     """
 
     demonstrations: Demonstrations

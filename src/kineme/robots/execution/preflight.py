@@ -237,12 +237,9 @@ class Check(NamedTuple):
 class Preflight:
     """All checks of one trajectory.
 
-    Attributes
-    ----------
-    checks : tuple of Check
-        For velocity, acceleration, position and torque the worst instant of each joint, then the arm as a whole.
-    unchecked : tuple of str
-        What could not be checked and why, one sentence each.
+    - `checks`: for velocity, acceleration, position and torque the worst instant of each joint, then the arm as a
+      whole.
+    - `unchecked`: what could not be checked and why, one sentence each.
     """
 
     checks: tuple[Check, ...]
