@@ -107,7 +107,7 @@ def test_all_batches_of_one_call_are_one_change(library, monkeypatch):
 
 def test_what_others_change_between_two_batches_ends_what_one_undo_takes_back(library, monkeypatch):
     monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
-    version, commit = library.version, learning.commit
+    version, commit = library.version, learning.commit.commit
 
     def after_another(store, batch, continues):
         if continues is not None:
