@@ -55,14 +55,9 @@ class StyleModel:
     Every number of a primitive is affine in s, ``theta(s) = mean + s @ basis``, so styles mix like the
     demonstrations' paths do; ln tau is affine in s too. Style zero is the average.
 
-    Attributes
-    ----------
-    styles : ndarray of shape (n, J)
-        Of the demonstrations; each column has mean 0 and mean square 1.
-    singular_values : ndarray of shape (min(n, d T),)
-        Of all styles that could be told apart, not of the J kept ones only.
-    recorded_as : RecordedAs or None
-        Channels of the recordings, where they are known; see `channels`.
+    - `styles` (n, J): of the demonstrations; each column has mean 0 and mean square 1.
+    - `singular_values` (min(n, d T),): of all styles that could be told apart, not of the J kept ones only.
+    - `recorded_as`: channels of the recordings, where they are known; see `channels`.
     """
 
     dmp: DMP
