@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import kineme
-from kineme.dmp.control import plan as plans
+from kineme.dmp.control import controller as controlling
 from kineme.dmp.control.plan import Status, passed
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate
@@ -124,7 +124,7 @@ def test_of_several_in_one_step_the_largest_distance_is_said_and_of_a_point_that
     via = [(0.4, x[80] + [0, 0.05]), (0.5, [np.nan, x[100, 1] + 0.1])]
     distances = []
     for order in (list, lambda some: [*some][::-1]):
-        monkeypatch.setattr(plans, "passed", lambda *told, order=order: order(passed(*told)))
+        monkeypatch.setattr(controlling, "passed", lambda *told, order=order: order(passed(*told)))
         distances.append(primitive.controller(0.55 * DURATION, via=via).step(obstacles=obstacle).via_missed)
     assert distances[0] == distances[1] > 0.01
     ((_, missed, status),), path = passing(primitive.controller(0.01, via=via[1:]), 200, obstacles=obstacle)

@@ -8,16 +8,27 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.dmp.control import plan as plans
+from kineme.dmp.control.plan import (
+    SHORTEST,
+    Influences,
+    MovingGoal,
+    ObstacleAvoidance,
+    Options,
+    Plan,
+    State,
+    Status,
+    numbers,
+    passed,
+)
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_number
 
-S = TypeVar("S", bound=plans.State)
+S = TypeVar("S", bound=State)
 
 _LARGEST = 1e150
 
-_NOTHING = plans.Status(0)
+_NOTHING = Status(0)
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
@@ -41,13 +52,13 @@ class Controller(Generic[S]):
 
     state: S
 
-    def __init__(self, plan: plans.Plan, dt: float, options: plans.Options) -> None:
-        if not isinstance(plan, plans.Plan):
+    def __init__(self, plan: Plan, dt: float, options: Options) -> None:
+        if not isinstance(plan, Plan):
             raise SpecificationError(
                 f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
             )
         check_number("dt", dt, above=0.0)
-        if not plans.SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
+        if not SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
             most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
             raise SpecificationError(f"expected dt of at most {most} {plan.duration:g} s, got {dt!r} s")
         self.dt, self.options = float(dt), options
@@ -59,20 +70,20 @@ class Controller(Generic[S]):
         )
         self._limited = any(limit is not None for limit in self._limits)
         self._settle = float(options.settle or plan.settle)
-        self._advance = stepper(plan, options.avoidance or plans.ObstacleAvoidance())
+        self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
         self.reset()
 
     def reset(self) -> S:
         """Back to the start, with the first goal; returns the state there."""
         plan = self._plan
-        self._goal = plans.MovingGoal(plan, plan.goal, self.options.goal_filter)
+        self._goal = MovingGoal(plan, plan.goal, self.options.goal_filter)
         self._clock = Clock(plan.begin, plan.periodic)
         self._set_tau(plan.duration)
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events, self._via_missed = _NOTHING, 0.0
-        influences = plans.Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
+        influences = Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
         self.state = self._report(*self._derivatives())
         return self.state
@@ -116,10 +127,10 @@ class Controller(Generic[S]):
         if wanted >= 0.0 and wanted * self.dt <= self._longest:
             self._tempo = wanted
         else:
-            self._events |= plans.Status.TEMPO_REJECTED
+            self._events |= Status.TEMPO_REJECTED
         length = self.dt if dt is None else read_number(dt)
-        if dt is not None and not (plans.SHORTEST * self._tau <= length <= self._longest >= length * self._tempo):
-            self._events |= plans.Status.DT_REJECTED
+        if dt is not None and not (SHORTEST * self._tau <= length <= self._longest >= length * self._tempo):
+            self._events |= Status.DT_REJECTED
             length = self.dt
         last = self._motion
         self._slowing = self._slowing if self.options.phase_stopping is not None and position is not None else 0.0
@@ -130,12 +141,12 @@ class Controller(Generic[S]):
         if obstacles is None and obstacle_velocities is None:
             self._obstacles = self._obstacle_velocities = self._nowhere
         elif (points := read_points(obstacles, obstacle_velocities, self._plan.n_positions)) is None:
-            self._events |= plans.Status.OBSTACLES_REJECTED
+            self._events |= Status.OBSTACLES_REJECTED
         else:
             self._obstacles, self._obstacle_velocities = points[0] - self._origin[: self._plan.n_positions], points[1]
         push = self._zeros if coupling is None else self._read_rates(coupling, self._motion[0])
         if push is None:
-            self._events |= plans.Status.COUPLING_REJECTED
+            self._events |= Status.COUPLING_REJECTED
             push = self._zeros
         velocity_before = self._derivatives()[0] if self._limited else self._zeros
         self._rate = self._tempo / (self._tau * (1.0 + self._slowing))
@@ -156,7 +167,7 @@ class Controller(Generic[S]):
         x = None if position is None else self._read_place(position, self._motion[0])
         v = None if velocity is None else self._read_rates(velocity, self._motion[0] if x is None else x)
         if (x is None and position is not None) or (v is None and velocity is not None):
-            self._events |= plans.Status.MEASUREMENT_REJECTED
+            self._events |= Status.MEASUREMENT_REJECTED
         if self.options.phase_stopping is not None:
             if x is not None:
                 error = x - self._motion[0]
@@ -185,7 +196,7 @@ class Controller(Generic[S]):
         unread = moving is None and velocity is not None
         remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
         if unread or target is None or not self._goal.aim(target, moving, remaining):
-            self._events |= plans.Status.GOAL_REJECTED
+            self._events |= Status.GOAL_REJECTED
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
@@ -204,21 +215,21 @@ class Controller(Generic[S]):
             velocities = velocities / self._rate
         goal_rate = self._zeros if goal_velocity is None else goal_velocity / self._rate
         goal = goal if goal_velocity is None else self._goal.ahead(goal, goal_rate)
-        influences = plans.Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
+        influences = Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
         begin = self._clock.u
         motion = self._advance(self._motion[:2], begin, du, influences)
         if self._usable(motion):
             self._clock.add_phase(du)
             if self._plan.via is not None:
-                for ahead, point in plans.passed(self._plan.via, begin, self._clock.u, du, self._plan.periodic):
+                for ahead, point in passed(self._plan.via, begin, self._clock.u, du, self._plan.periodic):
                     at = self._advance(self._motion[:2], begin, ahead, influences)[0, : len(point)]
                     self._via_missed = max(self._via_missed, float(np.sqrt(np.nansum((at - point) ** 2))))
                 if not self._via_missed <= self._plan.via.tolerance:
-                    self._events |= plans.Status.VIA_POINT_MISSED
+                    self._events |= Status.VIA_POINT_MISSED
             self._motion = motion
         else:
             self._motion = last
-            self._events |= plans.Status.STATE_KEPT
+            self._events |= Status.STATE_KEPT
 
     def _usable(self, motion: Array) -> bool:
         """Tell whether the movement can go on from there."""
@@ -234,16 +245,16 @@ class Controller(Generic[S]):
 
     def _report(self, velocity: Array, acceleration: Array) -> Any:
         x, clock = self._motion[0], self._clock
-        status = plans.Status.MOVING
+        status = Status.MOVING
         if self._rate == 0.0:
-            status = plans.Status.PAUSED
+            status = Status.PAUSED
         elif not self._plan.periodic and clock.u >= 1.0:
             distance = np.abs(x - self._goal.target).max()
             if max(distance, np.abs(self._motion[1]).max()) <= self._settle:
-                status = plans.Status.SETTLED
+                status = Status.SETTLED
         status = status if self._events is _NOTHING else status | self._events
         place, aim = self._origin + x, self._origin + self._goal.now
-        return plans.State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, status)
+        return State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, status)
 
 
 class RunningSum:
@@ -304,15 +315,15 @@ class Limits(NamedTuple):
     velocity: Array | None
     acceleration: Array | None
 
-    def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> plans.Status:
+    def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
         """Status of the limits that a step of dt from the velocity `before` exceeds, by the mean change over it too."""
         events = _NOTHING
         if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
-            events |= plans.Status.VELOCITY_LIMIT
+            events |= Status.VELOCITY_LIMIT
         if self.acceleration is not None:
             largest = np.maximum(np.abs(acceleration), np.abs(velocity - before) / dt)
             if (largest > self.acceleration).any():
-                events |= plans.Status.ACCELERATION_LIMIT
+                events |= Status.ACCELERATION_LIMIT
         return events
 
 
@@ -320,7 +331,7 @@ def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     """A limit as positive (d,), from a number or one per dimension."""
     if value is None:
         return None
-    array = plans.numbers(name, value)
+    array = numbers(name, value)
     if array.shape not in ((), (n_dims,)) or not (array > 0).all():
         raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
     return np.broadcast_to(array, n_dims)
