@@ -13,23 +13,14 @@ from typing import Any, NamedTuple
 class Unit(NamedTuple):
     """A unit of a quantity.
 
-    Attributes
-    ----------
-    symbol : str
-        How it is written by the program.
-    quantity : str
-        What it measures: "length", "angle", "time", ...; of a quotient both, as "angle/time" or "length/time^2".
-    size : Fraction or float
-        How many of the quantity's base unit it is: meters, radians, seconds, the whole range of a joint; for the other
-        quantities the unit of the International System. Exact but for angles.
-    zero : int
-        The number that stands for none of the quantity: -100 where a range goes from -100 to 100.
+    Its size is counted in meters, radians, seconds, the whole range of a joint; of other quantities in the unit of the
+    International System. It is exact but for angles.
     """
 
-    symbol: str
-    quantity: str
+    symbol: str  # as the program writes it
+    quantity: str  # "length", "angle", "time", ...; of a quotient both, as "angle/time" or "length/time^2"
     size: Fraction | float
-    zero: int = 0
+    zero: int = 0  # the number that stands for none of the quantity: -100 where a range goes from -100 to 100
 
 
 #: The units, and their spellings in lower case. Words whose meaning depends on the reader are not among them: Grad is a

@@ -191,6 +191,15 @@ def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array
     return t
 
 
+def as_point(name: str, values: ArrayLike, axes: Sequence[str]) -> Array:
+    """Return one finite number for each axis, as float64 (n,)."""
+    point = as_numbers(values, name)
+    if point.shape != (len(axes),) or not np.isfinite(point).all():
+        words = f"{len(axes)} finite numbers, {', '.join(axes)}"
+        raise SpecificationError(f"expected {name} as {words}, got {np.asarray(values).tolist()!r:.80}")
+    return point
+
+
 def as_path(path: Any, expected: str, instead: str = "") -> Path:
     """A path as `Path`; anything else is refused as not what was `expected`, with what to do `instead`."""
     try:
@@ -217,22 +226,25 @@ def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
         raise SpecificationError(f"expected {name} to be one of {list(choices)}, got {value!r}")
 
 
-def check_number(
+def check_number(  # noqa: PLR0913 - bounds of every kind
     name: str,
     value: Any,
     *,
     above: float | None = None,
     least: float | None = None,
+    below: float | None = None,
     most: float = LARGEST,
     smallest: float = 1 / LARGEST,
 ) -> None:
     """Refuse a parameter that is not a finite number in its range, or too close to 0 to be divided by."""
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
+    bound += "" if below is None else f" and below {below:g}"
     try:
         number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:  # an integer beyond the range of floats
         number = math.inf
     outside = (above is not None and number <= above) or (least is not None and number < least)
+    outside |= below is not None and number >= below
     if not math.isfinite(number) or outside:
         raise SpecificationError(f"expected {name} to be a number{bound}, got {value!r}")
     if not (number == 0 or smallest <= abs(number) <= most):

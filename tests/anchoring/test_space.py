@@ -10,8 +10,7 @@ from scipy.spatial.distance import pdist, squareform
 
 import kineme
 from kineme.anchoring.figures import apart
-from kineme.anchoring.scaling import classical_scaling
-from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
+from kineme.anchoring.space import ConceptualSpace, classical_scaling, conceptual_space, morph
 from kineme.recognition.recognizer import Recognizer
 from kineme.similarity.specification import ComparisonSpecification
 from soaking import examples

@@ -80,13 +80,10 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
     read = read_recordings(tmp_path)
     assert tuple(read.labels) == (None, "wave")
     assert read.demonstrations.labels is None
-    bare = read_recordings(tmp_path / "wave").without_labels()
-    assert tuple(bare.labels) == (None,)
     assert isinstance(read.labels, np.ndarray)  # as those of demonstrations: a label compared with it chooses movements
     assert [movement.name for movement in read[read.labels == "wave"]] == ["wave/a.csv"]
     with pytest.raises(ValueError, match="read-only"):
         read.labels[0] = "nod"
-    assert bare.demonstrations.labels is None
     assert repr(read).endswith(" samples each), 2 files, 0 problems)")
 
 

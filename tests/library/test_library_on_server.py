@@ -260,7 +260,7 @@ def test_writers_of_the_same_new_symbol_learn_beside_each_other(address):
 
 
 def test_movements_of_other_dimensions_are_refused_also_if_they_come_at_the_same_time(place, monkeypatch):
-    commit = learning.commit
+    commit = learning.commit.commit
     with ActionLibrary(place, create=True) as library:
 
         def after_another(*arguments):
@@ -269,7 +269,7 @@ def test_movements_of_other_dimensions_are_refused_also_if_they_come_at_the_same
                 other.learn(draw_movements(2, d=3))
             return commit(*arguments)
 
-        monkeypatch.setattr(learning, "commit", after_another)
+        monkeypatch.setattr(learning.commit, "commit", after_another)
         with pytest.raises(TrajectoryError, match="expected movements of 3 dimensions, as another process"):
             library.learn(draw_movements(2))
         assert library.verify() == []

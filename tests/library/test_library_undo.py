@@ -107,7 +107,7 @@ def test_all_batches_of_one_call_are_one_change(library, monkeypatch):
 
 def test_what_others_change_between_two_batches_ends_what_one_undo_takes_back(library, monkeypatch):
     monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
-    version, commit = library.version, learning.commit
+    version, commit = library.version, learning.commit.commit
 
     def after_another(store, batch, continues):
         if continues is not None:
@@ -115,7 +115,7 @@ def test_what_others_change_between_two_batches_ends_what_one_undo_takes_back(li
                 other.rename("push", "shove")
         return commit(store, batch, continues)
 
-    monkeypatch.setattr(learning, "commit", after_another)
+    monkeypatch.setattr(learning.commit, "commit", after_another)
     library.learn(draw_movements(8, 2, 9), ["wave", "other"] * 4)
     assert [change.action for change in library.history()[version:]] == ["learn", "rename", "learn"]
     assert library.undo() == (version + 4, version + 2, "learn")

@@ -326,7 +326,7 @@ def test_without_a_place_to_write_the_index_is_in_memory(tmp_path, monkeypatch):
     def refuse(*_):
         raise PermissionError("read only")
 
-    monkeypatch.setattr("kineme.pieces.index.whole_folder", refuse)
+    monkeypatch.setattr("kineme.pieces.search.whole_folder", refuse)
     assert open_shards(folder).nearest(paths[:1], 1)[0][0].similarity > 0.9999
     assert not list(folder.glob("search-*"))
 

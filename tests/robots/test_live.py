@@ -107,7 +107,7 @@ def test_a_start_out_of_reach_and_other_columns_are_refused():
     flat = kineme.DMP().learn([there.positions[:, :2]])
     with pytest.raises(TrajectoryError, match="expected a controller of three positions, or of poses"):
         ArmController(robot, flat.controller(DT))
-    with pytest.raises(SpecificationError, match="expected start as 7 joints"):
+    with pytest.raises(SpecificationError, match="expected start as 7 finite numbers"):
         ArmController(robot, moving.controller(DT), start=np.zeros(6))
     with pytest.raises(SpecificationError, match="panda_joint1 to start within"):
         ArmController(robot, moving.controller(DT), start=robot.rest + 5.0)

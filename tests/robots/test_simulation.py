@@ -232,7 +232,7 @@ def test_names_of_objects_are_data(name):
 def test_what_cannot_be_simulated_is_refused():
     with pytest.raises(SpecificationError, match="wam has none"):
         Simulation(load("wam"))
-    with pytest.raises(SpecificationError, match="three finite numbers"):
+    with pytest.raises(SpecificationError, match="3 finite numbers, x, y, z"):
         Simulation(panda(), {"cup": (0.4, np.nan, 0.1)})
     with pytest.raises(SpecificationError, match="start as 7 finite numbers"):
         Simulation(panda(), start=[0.0])

@@ -15,7 +15,7 @@ import pytest
 from sensor_samples import RATE, make_library, take
 
 from kineme.sensors.listen import Listener, Symbol
-from kineme.sensors.lsl import LslSink, LslSource
+from kineme.sensors.protocols import LslSink, LslSource
 
 pylsl = pytest.importorskip("pylsl", reason="no pylsl; pip install pylsl", exc_type=(ImportError, RuntimeError))
 
@@ -137,7 +137,7 @@ def test_markers_may_be_the_names_of_ended_movements_alone():
 
 _SOCKETS = """
 import os
-from kineme.sensors.lsl import LslSink, LslSource
+from kineme.sensors.protocols import LslSink, LslSource
 source, sink = LslSource(name="nobody"), LslSink()
 source.receive(0.5)
 own = set()

@@ -11,9 +11,9 @@ import pytest
 from sensor_samples import make_library, take
 
 from kineme.errors import DataError
-from kineme.sensors import osc
+from kineme.sensors import protocols
 from kineme.sensors.listen import Listener, Symbol, listen
-from kineme.sensors.osc import OscSink, OscSource
+from kineme.sensors.protocols import OscSink, OscSource
 
 pythonosc = pytest.importorskip("pythonosc", reason="no python-osc; pip install python-osc")
 from pythonosc.dispatcher import Dispatcher  # noqa: E402
@@ -90,7 +90,7 @@ def test_a_message_of_too_many_numbers_does_not_choose_the_address(source, sende
 
 
 def test_a_flood_of_messages_is_read_in_parts(source, sender_to, monkeypatch):
-    monkeypatch.setattr(osc, "_MOST", 50)
+    monkeypatch.setattr(protocols, "_MOST", 50)
     bundle, message = OscBundleBuilder(IMMEDIATELY), OscMessageBuilder("/foot")
     for _ in range(40):
         bundle.add_content(message.build())

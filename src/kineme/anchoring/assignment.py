@@ -25,6 +25,7 @@ from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once
 _STABLE = 0.75  # a valid cluster to Hennig (2007)
+_OVERLAP = 0.25  # of the two parts of a symbol, up to which it is named
 
 _REACH = 0.6  # share of the typical distance to another symbol, where no two movements show one symbol
 
@@ -33,15 +34,10 @@ _REACH = 0.6  # share of the typical distance to another symbol, where no two mo
 class Assignment:
     """Names of new movements, and proposals for the others.
 
-    Attributes
-    ----------
-    labels : ndarray of n labels or None
-        The symbol that each movement is assigned to; None is unknown.
-    p_values : ndarray of shape (n,)
-        The largest conformal p-value of each movement for any symbol.
-    proposals : Proposals
-        Clusters of unknown movements; members are indices of the new movements. `clusters` is -1 for movements that are
-        assigned to a symbol or stay unknown.
+    - `labels`: the symbol that each movement is assigned to; None is unknown.
+    - `p_values` (n,): the largest conformal p-value of each movement for any symbol.
+    - `proposals`: clusters of unknown movements; members are indices of the new movements. `clusters` is -1 for
+      movements that are assigned to a symbol or stay unknown.
     """
 
     labels: NDArray[np.object_]
@@ -81,10 +77,6 @@ def assign(
     min_members : int, default 3
         Movements of a proposal, at least. On average they are more similar than half way from the members of one
         symbol, which are 1, to those of the nearest other, 0.
-
-    Returns
-    -------
-    Assignment
 
     Raises
     ------
@@ -251,29 +243,18 @@ def suggest_splits(
     movements: MovementsLike | Described,
     labels: ArrayLike,
     *,
-    most: float = 0.25,
-    min_members: int = 2,
     like: Compares | None = None,
     widths: ArrayLike | None = None,
 ) -> tuple[Split, ...]:
     """Symbols whose members form two stable clusters, the most clearly apart first.
 
-    Average linkage in two; both parts must have a stability of 0.75 (Hennig 2007) and `min_members` members, and
-    their overlap (see `suggest_merges`) must be at most `most`. On handwriting, two shapes under one name have less
-    than 0.02, and the two most different ways of drawing one shape 0.4. Parts can be split again.
+    Average linkage in two; both parts must have a stability of 0.75 (Hennig 2007) and two members, and their overlap
+    (see `suggest_merges`) must be at most 0.25. On handwriting, two shapes under one name have less than 0.02, and the
+    two most different ways of drawing one shape 0.4. Parts can be split again.
 
-    Parameters
-    ----------
-    movements, labels, like, widths
-        As for `suggest_merges`. Without `widths` there must be another symbol that shows how far apart symbols are;
-        the only symbol is never split.
-    most : float, default 0.25
-        Overlap up to which a symbol is named.
-    min_members : int, default 2
-        Of each part.
+    Parameters are as for `suggest_merges`. Without `widths` there must be another symbol that shows how far apart
+    symbols are; the only symbol is never split.
     """
-    check_number("most", most, least=0.0)
-    check_count("min_members", min_members, 2)
     described, member, names = _labeled(movements, labels, like)
     if len(names) < 2 and widths is None:
         return ()
@@ -281,11 +262,9 @@ def suggest_splits(
     splits = []
     for k, name in enumerate(names):
         indices = np.flatnonzero(member == k)
-        if len(indices) >= 2 * min_members and len(indices) > 3:
+        if len(indices) > 3:
             splits.append(_in_two(name, described.take(indices), indices, sigma))
-    clear = (
-        s for s in splits if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members
-    )
+    clear = (s for s in splits if s.overlap <= _OVERLAP and s.stability >= _STABLE and min(map(len, s.parts)) > 1)
     return tuple(sorted(clear, key=lambda split: split.overlap))
 
 

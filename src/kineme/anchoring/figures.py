@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.anchoring.proposals import Proposal, Proposals, check_members
-from kineme.anchoring.scaling import classical_scaling
-from kineme.anchoring.space import ConceptualSpace
+from kineme.anchoring.space import ConceptualSpace, classical_scaling
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -48,9 +47,7 @@ def bare(axes: Any, n_dims: int) -> None:
     axes.margins(0.08)
 
 
-def draw_proposal(
-    movements: MovementsLike, proposal: Proposal, title: str = "", like: Compares | None = None
-) -> Figure:
+def draw_proposal(movements: MovementsLike, proposal: Proposal, like: Compares | None = None) -> Figure:
     """Members laid onto the medoid, the medoid bold, a dot at the start; inset, as they were recorded.
 
     Parameters
@@ -58,8 +55,6 @@ def draw_proposal(
     movements : movements
         Those that the proposal was made from.
     proposal : Proposal
-    title : str, optional
-        By default its size, cohesion and stability.
     like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take out.
 
@@ -79,7 +74,7 @@ def draw_proposal(
     plot_paths(inset, flat(recorded, medoid[0]), GRAY, 2.0, linewidth=0.6)
     bare(inset, demos.n_dims)
     inset.set_title("as recorded", fontsize=7, color=GRAY)
-    axes.set_title(drawable(title) or words(proposal))
+    axes.set_title(words(proposal))
     axes.set_xlabel(_ABOUT.get(demos.n_dims, "widest view of the medoid"))
     return figure
 

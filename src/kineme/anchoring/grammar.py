@@ -28,17 +28,12 @@ _RARE = 0.05  # probability from which on the text of a grammar says that a symb
 class Grammar:
     """Probabilities of what follows what in sequences of symbols.
 
-    Attributes
-    ----------
-    symbols : tuple of str
-        K symbols.
-    initial : ndarray of shape (K,)
-        Probability that a sequence begins with each.
-    transitions : ndarray of shape (K, K + 1)
-        Probability that each is followed by each; the last column is the end of the sequence. Rows sum to 1.
-    counts : ndarray of shape (K + 1, K + 1)
-        How often each was followed by each; the last row is the begin, the last column the end. Expected counts are no
-        whole numbers.
+    - `symbols`: K symbols.
+    - `initial` (K,): probability that a sequence begins with each.
+    - `transitions` (K, K + 1): probability that each is followed by each; the last column is the end of the sequence.
+      Rows sum to 1.
+    - `counts` (K + 1, K + 1): how often each was followed by each; the last row is the begin, the last column the end.
+      Expected counts are no whole numbers.
     """
 
     symbols: tuple[str, ...]
@@ -63,12 +58,7 @@ class Grammar:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data: the symbols, probabilities, and counts."""
-        return {
-            "symbols": list(self.symbols),
-            "initial": self.initial.tolist(),
-            "transitions": self.transitions.tolist(),
-            "counts": self.counts.tolist(),
-        }
+        return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
 
 class Posterior(NamedTuple):

@@ -38,14 +38,8 @@ _FLAT = 1e-9  # of the path: what members differ by when only rounding tells the
 class SymbolName:
     """Name, id and history of a symbol.
 
-    Attributes
-    ----------
-    id : str
-        Stable, whatever it is renamed to.
-    name : str
-    description : str
-    parents : tuple of str
-        Ids of the symbols that it was made from.
+    - `id`: stable, whatever it is renamed to.
+    - `parents`: ids of the symbols that it was made from.
     """
 
     id: str
@@ -165,15 +159,10 @@ def style_model(styles: dict[str, Any], dmp: Any) -> StyleModel:
 class Prototype:
     """A symbol as one movement.
 
-    Attributes
-    ----------
-    medoid : int
-        The member most similar to the others.
-    average : AveragePrimitive
-        Mean of the members and their spread, each laid onto the medoid first; at the medoid's position, size and
-        direction, and with the (geometric) mean of all durations.
-    maps : Maps
-        From each member onto the medoid.
+    - `medoid`: the member most similar to the others.
+    - `average`: mean of the members and their spread, each laid onto the medoid first; at the medoid's position, size
+      and direction, and with the (geometric) mean of all durations.
+    - `maps`: from each member onto the medoid.
     """
 
     medoid: int

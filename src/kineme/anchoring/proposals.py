@@ -34,23 +34,14 @@ _TILE = 20_000  # movements at a time
 class Proposal:
     """A cluster of movements that could be one symbol.
 
-    Attributes
-    ----------
-    members : ndarray of shape (m,)
-        Indices of the movements, ascending.
-    medoid : int
-        Index of the member most similar to the others.
-    cohesion : float
-        Mean similarity of two members, from 0 to 1.
-    stability : float
-        How well the cluster comes again when a fifth of the movements is left out: mean Jaccard coefficient, from 0 to
-        1; 0.75 and more is a valid cluster to Hennig (2007).
-    nearest : int or None
-        Index of the proposal most similar to this one.
-    nearness : float
-        Mean similarity of its members to these.
-    name : str or None
-        A name for it, if something proposes one, such as the tasks of the episodes that it comes from.
+    - `members` (m,): indices of the movements, ascending.
+    - `medoid`: index of the member most similar to the others.
+    - `cohesion`: mean similarity of two members, from 0 to 1.
+    - `stability`: how well the cluster comes again when a fifth of the movements is left out: mean Jaccard coefficient,
+      from 0 to 1; 0.75 and more is a valid cluster to Hennig (2007).
+    - `nearest`: index of the proposal most similar to this one.
+    - `nearness`: mean similarity of its members to these.
+    - `name`: a name for it, if something proposes one, such as the tasks of the episodes that it comes from.
     """
 
     members: NDArray[np.intp]
@@ -75,13 +66,8 @@ class Proposal:
 class Proposals:
     """Proposals, the largest first, and what is left over.
 
-    Attributes
-    ----------
-    proposals : tuple of Proposal
-    clusters : ndarray of shape (n,)
-        Index of the proposal of each movement, -1 for those left over.
-    widths : ndarray of shape (R,)
-        Of the kernels that they were compared with.
+    - `clusters` (n,): index of the proposal of each movement, -1 for those left over.
+    - `widths` (R,): of the kernels that they were compared with.
     """
 
     proposals: tuple[Proposal, ...]
@@ -268,10 +254,6 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
         More movements than this are clustered by a subsample of so many; each of the others is added to the cluster of
         its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
         default 2000; with the other methods 5000, in space 800.
-
-    Returns
-    -------
-    Proposals
 
     Raises
     ------

@@ -43,10 +43,7 @@ class Between(NamedTuple):
 class ConceptualSpace:
     """Symbols at distances; made by `conceptual_space`.
 
-    Attributes
-    ----------
-    symbols : tuple
-    distances : ndarray of shape (s, s)
+    - `distances` (s, s).
     """
 
     symbols: tuple[Any, ...]
@@ -66,10 +63,7 @@ class ConceptualSpace:
         where half way along an arc of angle t the detour is ``1 / cos(t / 4) - 1``, 0.08 at a right angle. A symbol
         between is also nearer to each of the two than they are to each other.
 
-        Raises
-        ------
-        SpecificationError
-            A symbol that is not among `symbols`, twice the same, or `eps` below 0.
+        Raises `SpecificationError`: a symbol that is not among `symbols`, twice the same, or `eps` below 0.
         """
         check_number("eps", eps, least=0.0)
         i, j = self.index(a), self.index(b)
@@ -88,10 +82,7 @@ class ConceptualSpace:
     def index(self, symbol: Any) -> int:
         """Index of a symbol among `symbols`.
 
-        Raises
-        ------
-        SpecificationError
-            It is not among them.
+        Raises `SpecificationError`: it is not among them.
         """
         if symbol not in self.symbols:
             raise SpecificationError(f"expected one of the symbols {list(self.symbols)}, got {symbol!r}")
@@ -102,7 +93,6 @@ def conceptual_space(
     symbols: Sequence[Hashable],
     prototypes: Described | MovementsLike,
     like: Compares | None = None,
-    widths: ArrayLike | None = None,
 ) -> ConceptualSpace:
     """Distances between symbols, by their prototypes.
 
@@ -111,7 +101,8 @@ def conceptual_space(
     distance as a Gaussian (Gärdenfors, chapter 1), and where no rotation is taken out d is a weighted Euclidean
     metric. The best rotation within a bounded angle may break the triangle inequality. The recognizer's arithmetic mean
     says who is who, but beyond the nearest all are equally far; a space needs distances that go on growing. So only
-    representations that are compared sample by sample count: the others are not metrics.
+    representations that are compared sample by sample count: the others are not metrics. The widths sigma_r are the
+    median distances of the prototypes, so that all representations matter alike.
 
     Parameters
     ----------
@@ -120,8 +111,6 @@ def conceptual_space(
         One for each symbol: its medoid, say.
     like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose representations and invariances to take.
-    widths : array_like of shape (R,), optional
-        By default the median distance of the prototypes in each representation, so that all of them matter alike.
 
     Raises
     ------
@@ -136,13 +125,9 @@ def conceptual_space(
             f"{len(names)} symbols, {len(set(names))} of them different"
         )
     n_rows = len(described.blocks)
-    if widths is None:
-        widths = median_distances(described)
-        widths = np.where(widths > 0, widths, 1.0)  # where the prototypes do not differ
-    sigma = np.asarray(widths, dtype=np.float64)
-    averaged(described, sigma)  # refuses widths of another number
+    widths = median_distances(described)[:n_rows]
     described = described.select(range(n_rows))
-    similarity = averaged(described, sigma[:n_rows])
+    similarity = averaged(described, np.where(widths > 0, widths, 1.0))  # 0 where the prototypes do not differ
     d = np.sqrt(np.maximum(-2.0 * similarity.log_average(described, described), 0.0))
     d = 0.5 * (d + d.T)
     np.fill_diagonal(d, 0.0)
@@ -173,7 +158,14 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     SpecificationError
         Different specifications, or shares that are not between 0 and 1.
     """
-    _check_pair(a, b)
+    for symbol in (a, b):
+        check_primitives(symbol)
+        if len(symbol) != 1:
+            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
+    if a.n_dims != b.n_dims:
+        raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
+    if a.dmp != b.dmp:
+        raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
     s = np.atleast_1d(np.asarray(shares, dtype=np.float64))
     if s.ndim != 1 or not ((s >= 0) & (s <= 1)).all():
         raise SpecificationError(f"expected shares of the way from 0 to 1, got {shares!r}")
@@ -198,17 +190,6 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     return from_numbers(a.dmp, theta, durations)
 
 
-def _check_pair(a: Primitives, b: Primitives) -> None:
-    for symbol in (a, b):
-        check_primitives(symbol)
-        if len(symbol) != 1:
-            raise TrajectoryError(f"expected one primitive at each end, got {len(symbol)}; choose one, primitives[0]")
-    if a.n_dims != b.n_dims:
-        raise TrajectoryError(f"expected primitives of the same dimensions, got {a.n_dims} and {b.n_dims}")
-    if a.dmp != b.dmp:
-        raise SpecificationError(f"expected primitives of one specification, got {a.dmp} and {b.dmp}; learn them again")
-
-
 def _part_rotation(R: Array, s: Array) -> Array:
     """Rotations by the share s (m,) of the angle of R, about the same axis."""
     from scipy.spatial.transform import Rotation
@@ -221,3 +202,24 @@ def _part_rotation(R: Array, s: Array) -> Array:
     return np.asarray(
         Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(in_space).as_rotvec()).as_matrix()[:, :d, :d]
     )
+
+
+def classical_scaling(distances: Array) -> tuple[Array, float]:
+    """Positions (s, 2) in the plane whose distances are close to those given, and the share of their squares kept.
+
+    Classical multidimensional scaling: the two leading eigenvectors of ``-J D^2 J / 2``, J taking out the mean.
+
+    Source: W. S. Torgerson, "Multidimensional scaling: I. Theory and method", Psychometrika 17, 1952.
+    """
+    squares = distances**2
+    centered = squares - squares.mean(axis=0)
+    B = -0.5 * (centered - centered.mean(axis=1, keepdims=True))
+    values, vectors = np.linalg.eigh(0.5 * (B + B.T))
+    positive = np.maximum(values[::-1], 0.0)
+    positions = np.zeros((len(distances), 2))
+    k = min(2, len(distances))
+    leading = vectors[:, ::-1][:, :k]
+    sign = np.sign(leading[np.abs(leading).argmax(axis=0), np.arange(k)])  # an eigenvector has no sign of its own
+    positions[:, :k] = leading * np.where(sign == 0, 1.0, sign) * np.sqrt(positive[:k])
+    total = float(positive.sum())
+    return positions, float(positive[:2].sum() / total) if total > 0 else 1.0

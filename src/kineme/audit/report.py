@@ -55,13 +55,10 @@ def verdict(audit: Audit) -> str:
             f"{hidden:,} more are as unusual as no good ones are, and are not flagged: more than a fifth of the set "
             "may be bad, so that its episodes vouch for each other. The picture of the page shows them."
         )
-    return f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. {_chance(audit)} {advice}"
-
-
-def _chance(audit: Audit) -> str:
     return (
-        f"At most {100 * audit.error_rate:.2g} % of the good episodes are flagged by chance, here about "
-        f"{audit.by_chance:,}: a set without any fault has them, too."
+        f"{hours}. {audit.flagged.sum():,} flagged: {', '.join(parts) or 'none'}. At most "
+        f"{100 * audit.error_rate:.2g} % of the good episodes are flagged by chance, here about {audit.by_chance:,}: a "
+        f"set without any fault has them, too. {advice}"
     )
 
 
@@ -122,24 +119,15 @@ def audit_as_data(audit: Audit) -> dict[str, Any]:
         "kinds": KINDS,
         "checks": [{"name": check.name, "meaning": check.meaning, "remedy": check.remedy} for check in CHECKS],
         "findings": [
-            {
-                "episode": finding.episode, "task": finding.task, "place": finding.place, "seconds": finding.seconds,
-                "kind": finding.kind, "p_value": finding.p_value, "evidence": _finite(finding.evidence),
-                "reasons": [
-                    {
-                        "check": reason.check, "words": reason.words, "channel": reason.channel or None,
-                        "start": reason.start, "end": reason.end, "evidence": _finite(reason.evidence),
-                    }
-                    for reason in finding.reasons
-                ],
-            }
+            _plain(finding)
+            | {"reasons": [_plain(reason) | {"channel": reason.channel or None} for reason in finding.reasons]}
             for finding in audit.findings
         ],
     }  # fmt: skip
 
 
-def _finite(evidence: float) -> float | None:
-    return evidence if math.isfinite(evidence) else None
+def _plain(record: Finding | Reason) -> dict[str, Any]:
+    return record._asdict() | {"evidence": record.evidence if math.isfinite(record.evidence) else None}
 
 
 def kept_episodes(audit: Audit) -> list[int]:
@@ -150,8 +138,7 @@ def kept_episodes(audit: Audit) -> list[int]:
 def write_kept(path: Path, audit: Audit, *, replace: bool = False) -> Path:
     """Write which episodes to train on: as .json their numbers alone, else a CSV table with a row for each episode.
 
-    Its columns are ``episode_index``, ``keep`` (1 or 0), ``p`` and ``reason``. Raises an `OSError` where a file is
-    there, unless it is replaced.
+    Its columns are ``episode_index``, ``keep`` (1 or 0), ``p`` and ``reason``.
     """
     if path.suffix.lower() == ".json":
         text = json.dumps(kept_episodes(audit)) + "\n"

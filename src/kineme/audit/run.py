@@ -32,6 +32,7 @@ _RANKED = 10  # episodes that are listed although nothing calibrates them
 _LONGEST = 300  # letters that are kept of the problems of an episode
 _LEAST_EVIDENCE = 0.3
 _SIDES: dict[str, Callable[[Array], Array]] = {"upper": np.positive, "lower": np.negative, "both": np.abs}
+_NONE = np.empty(0, dtype=np.float32)
 _SHARED = 0.5  # share of the episodes beyond which a contradiction is one of the set
 
 #: Why an episode is listed -> what that promises.
@@ -131,13 +132,12 @@ class Measurement(NamedTuple):
 def measure_episode(episode: Episode) -> Measurement:
     """Measure one episode alone."""
     motion, problems = motion_of(episode), tuple(shortened(problem, _LONGEST) for problem in episode.problems)
-    empty = np.empty(0, dtype=np.float32)
     if motion is None:
         seconds = len(episode) / episode.fps if episode.fps > 0 else 0.0
         few = f"has {counted(len(episode), 'frame')} of motion; at least {FEWEST_FRAMES} are needed"
         problems = problems or (few,)
         about = episode.task, episode.place, episode.fps, problems, episode.notes
-        return Measurement(episode.number, seconds, *about, (), (), empty, empty)
+        return Measurement(episode.number, seconds, *about, (), (), _NONE, _NONE)
     with np.errstate(all="ignore"):  # damaged values are huge
         measures = [check.measure(motion) for check in CHECKS if check.measure is not None]
     values = np.concatenate([measure.values for measure in measures]).astype(np.float32)
@@ -152,11 +152,7 @@ class _Measured:
     """All that is kept of the episodes while they are read."""
 
     def __init__(self) -> None:
-        self.numbers: list[int] = []
-        self.seconds: list[float] = []
-        self.tasks: list[str | None] = []
-        self.places: list[str] = []
-        self.rates: list[float] = []
+        self.episodes: list[Measurement] = []  # without what is spooled
         self.problems: dict[int, str] = {}
         self.unusable: list[int] = []  # episodes without motion that can be compared
         self.notes: list[str] = []  # on the set
@@ -171,7 +167,7 @@ class _Measured:
         if episode.number < 0:
             self.notes += episode.problems
             return
-        at, is_usable, problem = len(self.numbers), bool(episode.names), "; ".join(episode.problems)
+        at, is_usable, problem = len(self.episodes), bool(episode.names), "; ".join(episode.problems)
         if is_usable and self.names is None:
             self.names = episode.names
         elif is_usable and episode.names != self.names:
@@ -182,11 +178,7 @@ class _Measured:
         if not is_usable:
             self.unusable.append(at)
         self.remarks.update(episode.notes)
-        self.numbers.append(episode.number)
-        self.seconds.append(episode.seconds)
-        self.tasks.append(episode.task)
-        self.places.append(episode.place)
-        self.rates.append(episode.fps)
+        self.episodes.append(episode._replace(problems=(), notes=(), names=(), sizes=(), values=_NONE, drawn=_NONE))
         self._keep(episode if is_usable else None, at)
 
     def close(self) -> None:
@@ -226,7 +218,7 @@ class _Measured:
 
     def values(self) -> list[Array]:
         """Return the values (n, k) of each check that measures an episode alone."""
-        table = np.frombuffer(self.rows, dtype=np.float32).reshape(len(self.numbers), sum(self.sizes))
+        table = np.frombuffer(self.rows, dtype=np.float32).reshape(len(self.episodes), sum(self.sizes))
         return np.split(table, np.cumsum(self.sizes)[:-1], axis=1)
 
 
@@ -245,22 +237,11 @@ def audit_episodes(
 ) -> Audit:
     """Find the episodes of a data set that are unlike the others, or contradict it; see `kineme.audit.calibrate`.
 
-    Parameters
-    ----------
-    episodes : iterable of Episode
-        Read once, one at a time.
-    error_rate : float, default 0.05
-        Share of good episodes that may be flagged. It takes ``1 / error_rate`` episodes; with fewer, only
-        contradictions are flagged, and the others ranked.
-    progress : callable, optional
-        Called with the number of episodes that are done since the last call, twice for each: measured, compared.
-
-    Raises
-    ------
-    DataError
-        No episode at all.
-    SpecificationError
-        An error rate that is not between 0 and 1.
+    - `episodes`: read once, one at a time.
+    - `error_rate`: share of good episodes that may be flagged. It takes ``1 / error_rate`` episodes; with fewer, only
+      contradictions are flagged, and the others ranked.
+    - `progress`: called with the number of episodes that are done since the last call, twice for each: measured,
+      compared.
     """
     return audit_measured(map(measure_episode, episodes), error_rate, progress)
 
@@ -275,14 +256,15 @@ def audit_measured(
             measured.add(episode)
             if progress is not None:
                 progress(1)
-        if not measured.numbers:
+        if not measured.episodes:
             raise DataError("expected a data set with episodes, got one without; see if its download is complete")
         return _audited(measured, error_rate, progress or (lambda done: None))
 
 
 def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], object]) -> Audit:
     """Compare what was measured, and list what is unusual."""
-    tasks = calibrate.tasks_of(measured.tasks)
+    episodes = measured.episodes
+    tasks = calibrate.tasks_of([episode.task for episode in episodes])
     compared = list(_compared(measured, tasks, progress)) if measured.names else []
     broken, of_the_set = _contradictions(measured, compared)
     soft = [row.evidence for row in compared if row.check.side != "exact"]
@@ -290,8 +272,8 @@ def _audited(measured: _Measured, error_rate: float, progress: Callable[[int], o
     ranking = calibrate.rank(evidence, ~broken, error_rate)
     flagged = broken | ((ranking.p_values <= error_rate + 1e-12) | ranking.outlying) & (ranking.by_chance > 0)
     return Audit(
-        np.array(measured.numbers), sum(measured.seconds), len({*filter(None, measured.tasks)}) or 1, error_rate,
-        ranking.by_chance,
+        np.array([episode.number for episode in episodes]), sum(episode.seconds for episode in episodes),
+        len({episode.task for episode in episodes if episode.task}) or 1, error_rate, ranking.by_chance,
         np.where(broken, 0.0, ranking.p_values), ranking.evidence, flagged,
         _findings(measured, compared, broken, ranking, flagged, tasks), of_the_set,
     )  # fmt: skip
@@ -302,7 +284,7 @@ def _compared(measured: _Measured, tasks: calibrate.Groups, say: Callable[[int],
     alone = [check for check in CHECKS if check.measure is not None]
     values = dict(zip([check.name for check in alone], measured.values(), strict=True))
     extents = np.nanmedian(values["above"] - values["below"], axis=0).astype(np.float64)
-    usable = np.ones(len(measured.numbers), dtype=np.bool_)
+    usable = np.ones(len(measured.episodes), dtype=np.bool_)
     usable[measured.unusable] = False
     groups = {by_task: calibrate.groups_of(tasks, fewest) for by_task, fewest in calibrate.ENOUGH.items()}
     ways = calibrate.unlike(measured.ways, extents, [rows[usable[rows]] for rows in tasks], len(usable), say)
@@ -324,7 +306,7 @@ def _compared(measured: _Measured, tasks: calibrate.Groups, say: Callable[[int],
 
 def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Return which episodes contradict themselves (n,), and what more than half of the set does, which flags none."""
-    n = len(measured.numbers)
+    n = len(measured.episodes)
     broken, of_the_set = np.zeros(n, dtype=np.bool_), list(measured.notes)
     of_the_set += [remark for remark, count in measured.remarks.items() if count > _SHARED * n]
     for row in compared:
@@ -334,7 +316,7 @@ def _contradictions(measured: _Measured, compared: list[_Compared]) -> tuple[NDA
         if wrong.mean() > _SHARED and n > 1:
             first = int(wrong.argmax())
             words = row.check.words.format(
-                value=float(np.median(row.values[wrong, 0])), fps=measured.rates[first],
+                value=float(np.median(row.values[wrong, 0])), fps=measured.episodes[first].fps,
                 problems=measured.problems.get(first, ""),
             )  # fmt: skip
             of_the_set.append(f"{row.check.name}: in {wrong.sum():,} of {counted(n, 'episode')}, {words}")
@@ -352,7 +334,6 @@ def _findings(
     flagged: NDArray[np.bool_],
     tasks: calibrate.Groups,
 ) -> tuple[Finding, ...]:
-    """Return the findings, in their order."""
     order = np.lexsort((-ranking.evidence, ~broken))
     listed = order[flagged[order]]
     if not (flagged & ~broken).any():
@@ -374,20 +355,23 @@ def _findings(
         words = row.check.words.format(
             value=row.check.shown(float(row.values[at, column])), problems=measured.problems.get(at, ""),
             usual=row.check.shown(float(usual[row.check.name, rows[0]][column])),
-            channel=channel, column=heads[column // size], fps=measured.rates[at],
+            channel=channel, column=heads[column // size], fps=measured.episodes[at].fps,
         )  # fmt: skip
-        start, end = (0.0, measured.seconds[at]) if row.first < 0 else measured.stretch(at, row.first + column)
+        start, end = 0.0, measured.episodes[at].seconds
+        if row.first >= 0:
+            start, end = measured.stretch(at, row.first + column)
         return Reason(row.check.name, words, channel, start, end, float(row.evidence[at]))
 
     def finding(at: int) -> Finding:
+        episode = measured.episodes[at]
         by_evidence = sorted(compared, key=lambda row: -row.evidence[at])
         least = min(_LEAST_REASON, by_evidence[0].evidence[at]) if by_evidence else 0.0
         reasons = [reason(row, at) for row in by_evidence if row.evidence[at] >= least > 0]
         if at in measured.problems and not any(reason.check == "problems" for reason in reasons):
-            reasons = [Reason("problems", measured.problems[at], "", 0.0, measured.seconds[at], np.inf), *reasons]
+            reasons = [Reason("problems", measured.problems[at], "", 0.0, episode.seconds, np.inf), *reasons]
         kind = "contradiction" if broken[at] else "outlying" if ranking.outlying[at] else "unusual"
         return Finding(
-            measured.numbers[at], measured.tasks[at], measured.places[at], measured.seconds[at],
+            episode.number, episode.task, episode.place, episode.seconds,
             kind if flagged[at] else "ranked", 0.0 if broken[at] else float(ranking.p_values[at]),
             float(ranking.evidence[at]), tuple(reasons[:_REASONS]),
         )  # fmt: skip

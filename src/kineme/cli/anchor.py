@@ -171,16 +171,13 @@ def _as_data(proposals: Any) -> dict[str, Any]:
         "proposals": [
             {
                 "number": number,
-                "movements": [int(i) for i in proposal.members],
-                "medoid": proposal.medoid,
-                "cohesion": proposal.cohesion,
-                "stability": proposal.stability,
+                "movements": proposal.members.tolist(),
+                **{name: getattr(proposal, name) for name in ("medoid", "cohesion", "stability", "name")},
                 "nearest": None if proposal.nearest is None else proposal.nearest + 1,
-                "name": proposal.name,
             }
-            for number, proposal in enumerate((proposals[i] for i in range(len(proposals))), 1)
+            for number, proposal in enumerate(proposals, 1)
         ],
-        "left_over": [int(i) for i in proposals.left_over],
+        "left_over": proposals.left_over.tolist(),
     }
 
 

@@ -10,16 +10,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import (
-    GroupedCommand,
-    Parsed,
-    error_rate_option,
-    force_option,
-    heading,
-    json_option,
-    library_option,
-    rerun_option,
-)
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, progress, say, stretch_cells, table, write
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, notes_beside, pieces, problem_lines, recordings_argument, seconds_of
@@ -35,24 +26,27 @@ def _format(text: str) -> str:
     return text
 
 
-@click.command(cls=GroupedCommand, short_help="Find the symbols of a library in long recordings.")
+@click.command(cls=opts.GroupedCommand, short_help="Find the symbols of a library in long recordings.")
 @recordings_argument
-@library_option
-@error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
+@opts.library_option
+@opts.error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
 @layout_options
-@heading("Output")
+@opts.heading("Output")
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path),
     help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
     "LeRobot data set.  [default: show a table]",
 )  # fmt: skip
 @click.option(
-    "--format", "form", type=Parsed("NAME", _format), help="Format, where the ending does not say it: csv, elan, ..."
+    "--format",
+    "form",
+    type=opts.Parsed("NAME", _format),
+    help="Format, where the ending does not say it: csv, elan, ...",
 )
-@json_option
+@opts.json_option
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
-@rerun_option
-@force_option
+@opts.rerun_option
+@opts.force_option
 @pieces_options
 def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.

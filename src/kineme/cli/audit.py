@@ -9,40 +9,33 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import (
-    FILE,
-    Finite,
-    GroupedCommand,
-    error_rate_option,
-    force_option,
-    json_option,
-    rerun_option,
-    under,
-)
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, progress, say
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import Recording
 from kineme.reporting.text import printable
 
 
-@click.command(cls=GroupedCommand, short_help="Find the bad episodes of a set of robot data.")
+@click.command(cls=opts.GroupedCommand, short_help="Find the bad episodes of a set of robot data.")
 @click.argument("dataset", type=Recording(allow_dash=False))
-@error_rate_option("Share of good episodes that may be flagged.")
-@click.option("--rate", type=Finite(0, min_open=True), help="Samples per second, where the data set does not say it.")
-@under(
+@opts.error_rate_option("Share of good episodes that may be flagged.")
+@click.option(
+    "--rate", type=opts.Finite(0, min_open=True), help="Samples per second, where the data set does not say it."
+)
+@opts.under(
     "Output",
     click.option(
         "--output", "-o", type=click.Path(path_type=Path),
         help="One HTML page: the verdict, a strip of each flagged episode; of a large archive, a folder of parts.",
     ),
     click.option(
-        "--train-mask", "mask", type=FILE,
+        "--train-mask", "mask", type=opts.FILE,
         help="Which episodes to train on: a .csv table, or a .json list of the numbers of those that are kept.",
     ),
 )  # fmt: skip
-@rerun_option
-@json_option
-@force_option
+@opts.rerun_option
+@opts.json_option
+@opts.force_option
 @pieces_options
 def audit(dataset: Path, error_rate: float, output: Path | None, mask: Path | None, **options: Any) -> None:
     """Audit DATASET, a folder or file with episodes of robot data: which are bad, why, where, and what to do.
@@ -86,16 +79,9 @@ class AuditFiles(NamedTuple):
 
     def check(self, force: bool, dataset: Path) -> None:
         """Refuse paths that cannot be written, before anything is read."""
-        endings = ((self.page, (".html", ".htm")), (self.mask, (".csv", ".json")), (self.rerun, None))
-        for path, allowed in endings:
-            if path is not None:
-                check_new(path, force, dataset)
-                if allowed and path.suffix.lower() not in allowed:
-                    raise click.UsageError(f"expected a path ending in {' or '.join(allowed)}, got {printable(path)}")
-                if not path.parent.is_dir():
-                    raise click.UsageError(
-                        f"expected a folder to write into, there is none at {printable(path.parent)}"
-                    )
+        check_new(self.page, force, dataset, endings=(".html", ".htm"), flag="--output")
+        check_new(self.mask, force, dataset, endings=(".csv", ".json"), flag="--train-mask")
+        check_new(self.rerun, force, dataset, endings=(".rrd",), flag="--rerun")
 
     def write(self, result: Any, dataset: Path, read: Callable[[], Iterable[Any]], force: bool) -> dict[str, Any]:
         """Write them, and return the audit as data; flagged episodes are read again where they are drawn."""

@@ -7,50 +7,39 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import (
-    FILE,
-    NUMBERS,
-    Finite,
-    GroupedCommand,
-    force_option,
-    given_options,
-    heading,
-    json_option,
-    library_option,
-    whole,
-)
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, say
 from kineme.reporting.text import printable
 
 _SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "stop_at_each_step", "plot", "view")  # of what moves
 
 
-@click.command(cls=GroupedCommand, short_help="Execute a plan on an arm, in a simulation.")
-@click.argument("plan", type=FILE)
-@library_option
-@heading("Arm")
+@click.command(cls=opts.GroupedCommand, short_help="Execute a plan on an arm, in a simulation.")
+@click.argument("plan", type=opts.FILE)
+@opts.library_option
+@opts.heading("Arm")
 @click.option("--robot", required=True, help="panda, ur5e, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
               help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
-@click.option("--origin", type=NUMBERS, default="0,0,0", show_default=True,
+@click.option("--origin", type=opts.NUMBERS, default="0,0,0", show_default=True,
               help="Where the recordings have their origin in the frame of the robot [m].")  # fmt: skip
-@heading("Simulation")
+@opts.heading("Simulation")
 @click.option("--simulate", is_flag=True, help="Execute it in MuJoCo.  [default: only check the joints of each step]")
 @click.option("--disturb", multiple=True, help="push:0,30,0@1.5 [N, s]; cup:0.4,0.1,0.2@3 [m, s]; cup:gone@3; may "
               "be repeated.")  # fmt: skip
-@click.option("--noise", type=Finite(0), default=0.0, help="Standard deviation of measured positions [m].")
-@click.option("--seed", type=whole(0), default=0, help="Of that noise.")
-@click.option("--replans", type=whole(0, 100), default=3, show_default=True, help="Plans more, at most.")
+@click.option("--noise", type=opts.Finite(0), default=0.0, help="Standard deviation of measured positions [m].")
+@click.option("--seed", type=opts.whole(0), default=0, help="Of that noise.")
+@click.option("--replans", type=opts.whole(0, 100), default=3, show_default=True, help="Plans more, at most.")
 @click.option("--planner", help="An engine of unified-planning that is installed, as aries.")
 @click.option("--stop-at-each-step", is_flag=True, help="Stand after each step, also where the next may go on.")
-@heading("Output")
+@opts.heading("Output")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A .json file for the report; without --simulate "
               "a new folder for it and the joints of each step, in CSV.")  # fmt: skip
-@click.option("--plot", type=FILE, help="Where the tip and the objects went: a .png, .svg or .pdf file.")
-@click.option("--view", type=FILE, help="The arm as it moves: a .gif file.")
-@json_option
-@force_option
+@click.option("--plot", type=opts.FILE, help="Where the tip and the objects went: a .png, .svg or .pdf file.")
+@click.option("--view", type=opts.FILE, help="The arm as it moves: a .gif file.")
+@opts.json_option
+@opts.force_option
 def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> None:
     """Execute PLAN, a file of kineme plan, on an arm: each step as its nearest demonstration, within what was shown.
 
@@ -87,24 +76,12 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
 
 def _check_options(plan: Path, output: Path | None, options: dict[str, Any]) -> None:
     """Refuse options that do not go together, before anything is computed."""
-    if not options["simulate"] and (useless := given_options(_SIMULATED)):
+    if not options["simulate"] and (useless := opts.given_options(_SIMULATED)):
         raise click.UsageError(f"expected --simulate with {', '.join(useless)}: without it nothing moves")
-    endings = {
-        "output": (".json",) if options["simulate"] else ("",),
-        "plot": (".png", ".svg", ".pdf"),
-        "view": (".gif",),
-    }
-    for name, path in (("output", output), ("plot", options["plot"]), ("view", options["view"])):
-        if path is None:
-            continue
-        if path.suffix.lower() not in endings[name]:
-            expected = ", ".join(ending or "a new folder" for ending in endings[name])
-            raise click.BadParameter(f"expected {expected}, got {printable(path.name)}", param_hint=f"--{name}")
-        if path.is_dir():
-            raise click.UsageError(
-                f"expected a new file or folder to write, {printable(path)} is a folder that is there"
-            )
-        check_new(path, options["force"], plan)
+    report = (".json",) if options["simulate"] else ("",)
+    check_new(output, options["force"], plan, endings=report, flag="--output")
+    check_new(options["plot"], options["force"], plan, endings=(".png", ".svg", ".pdf"), flag="--plot")
+    check_new(options["view"], options["force"], plan, endings=(".gif",), flag="--view")
 
 
 def _simulated(plan: Any, library: Any, robot: Any, options: dict[str, Any]) -> Any:

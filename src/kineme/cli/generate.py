@@ -6,19 +6,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import (
-    FILE,
-    NUMBERS,
-    Finite,
-    GroupedCommand,
-    force_option,
-    heading,
-    json_option,
-    plot_option,
-    rerun_option,
-    source_options,
-    specification_options,
-)
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, write, write_bytes
 from kineme.cli.reading import layout_options, name_of_source, read_source
 from kineme.reporting.text import printable
@@ -27,27 +15,27 @@ _BAD_FIT = 0.05  # of the extent of the recording
 _MISSED = 0.01  # of the extent of a column
 
 
-@click.command(cls=GroupedCommand, short_help="Generate a movement from a symbol or a recording.")
-@source_options
-@heading("Movement")
+@click.command(cls=opts.GroupedCommand, short_help="Generate a movement from a symbol or a recording.")
+@opts.source_options
+@opts.heading("Movement")
 @click.option(
-    "--start", type=NUMBERS, help="Where it starts, in all columns but discrete ones.  [default: as demonstrated]"
+    "--start", type=opts.NUMBERS, help="Where it starts, in all columns but discrete ones.  [default: as demonstrated]"
 )
-@click.option("--goal", type=NUMBERS, help="Where it ends, likewise.  [default: as demonstrated]")
-@click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
-@click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
-@click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
-@click.option("--obstacle", "obstacles", type=NUMBERS, multiple=True, help="Point to avoid; may be repeated.")
-@specification_options
+@click.option("--goal", type=opts.NUMBERS, help="Where it ends, likewise.  [default: as demonstrated]")
+@click.option("--duration", type=opts.Finite(), help="Duration in seconds.  [default: as demonstrated]")
+@click.option("--rate", type=opts.Finite(), default=100.0, show_default=True, help="Samples per second at least.")
+@click.option("--settle", type=opts.Finite(), help="Continue past the duration until this close to the goal.")
+@click.option("--obstacle", "obstacles", type=opts.NUMBERS, multiple=True, help="Point to avoid; may be repeated.")
+@opts.specification_options
 @layout_options
-@heading("Output")
-@click.option("--save", type=FILE, help="Save the primitive to this .kineme file.")
-@click.option("--output", "-o", type=FILE, default="-", show_default=True,
+@opts.heading("Output")
+@click.option("--save", type=opts.FILE, help="Save the primitive to this .kineme file.")
+@click.option("--output", "-o", type=opts.FILE, default="-", show_default=True,
               help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV or --json.")  # fmt: skip
-@json_option
-@plot_option
-@rerun_option
-@force_option
+@opts.json_option
+@opts.plot_option
+@opts.rerun_option
+@opts.force_option
 def generate(**options: Any) -> None:
     """Generate a movement from SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
 

@@ -216,14 +216,8 @@ def import_(path: Path, folder: Any, as_json: bool) -> None:
 
 def brief(symbol: Any) -> dict[str, Any]:
     """A symbol as plain data."""
-    return {
-        "name": symbol.name,
-        "id": symbol.id,
-        "description": symbol.description,
-        "movements": len(symbol),
-        "prototype": symbol.prototype,
-        "parents": list(symbol.parents),
-    }
+    data = {name: getattr(symbol, name) for name in ("name", "id", "description", "prototype")}
+    return data | {"movements": len(symbol), "parents": list(symbol.parents)}
 
 
 def _report_text(data: dict[str, Any]) -> str:

@@ -66,7 +66,7 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     kineme listen --library actions/ --from lsl --type MoCap --to lsl
     kineme listen --library actions/ --from osc --address /hand --to osc --send-to 127.0.0.1:9001
     """  # noqa: D301 - a backspace tells click to keep the lines
-    from kineme.sensors.table import ADAPTERS
+    from kineme.sensors.protocols import ADAPTERS
 
     inward, outward = ADAPTERS[source], {protocol: ADAPTERS[protocol] for protocol in sinks}
     used = {*inward.takes, *(name for adapter in outward.values() for name in adapter.gives)}

@@ -7,22 +7,9 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import (
-    FOLDER,
-    NUMBERS,
-    RERUN,
-    Finite,
-    GroupedCommand,
-    flag_of,
-    heading,
-    json_option,
-    source_options,
-    specification_options,
-    under,
-)
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options, name_of_source, read_source
-from kineme.reporting.text import printable
 
 #: Option -> its short name if it has one, endings of its files, what it says about itself.
 _FILES = {
@@ -35,15 +22,15 @@ _FILES = {
     "ros2": (None, (".mcap", ""), "A .mcap, or a folder, of ROS 2 with the same."),
     "action_goal": (None, (".yaml", ".yml", ".json"), "A .yaml or .json file for ros2 action send_goal."),
     "plot": (None, (".png", ".svg", ".pdf"), "Path and joints beside their limits: a .png, .svg or .pdf file."),
-    "rerun": (None, (".rrd",), RERUN),
+    "rerun": (None, (".rrd",), opts.RERUN),
     "view": (None, (".html", ".htm"), "An .html page in which the arm moves; opens in a browser, needs no network."),
 }
 
 #: Add an option for each file that is written.
-file_options = under(
+file_options = opts.under(
     "Output",
     *(
-        click.option(flag_of(name), *([short] if short else []), type=click.Path(path_type=Path), help=words)
+        click.option(opts.flag_of(name), *([short] if short else []), type=click.Path(path_type=Path), help=words)
         for name, (short, _, words) in _FILES.items()
     ),
 )
@@ -51,21 +38,9 @@ file_options = under(
 
 def check_files(options: dict[str, Any]) -> None:
     """Refuse files that no writer writes, or that are there, before an arm is loaded."""
+    force, source = options["overwrite"] or options["force"], options["source"]
     for name, (_, endings, _) in _FILES.items():
-        path = options[name]
-        if path is None or (name == "output" and str(path) == "-"):
-            continue
-        if path.suffix.lower() not in endings:
-            expected = ", ".join(ending or "a folder" for ending in endings)
-            words = f"expected {expected}, got {path.suffix or 'no ending'}"
-            raise click.BadParameter(words, param_hint=flag_of(name))
-        if path.is_dir():
-            raise click.UsageError(
-                f"expected a new file or folder to write, {printable(path)} is a folder that is there"
-            )
-        if not path.absolute().parent.is_dir():
-            raise click.UsageError(f"expected a folder to write {printable(path)} into, there is none; create it")
-        check_new(path, options["overwrite"] or options["force"], options["source"], remedy="--overwrite")
+        check_new(options[name], force, source, remedy="--overwrite", endings=endings, flag=opts.flag_of(name))
 
 
 def write_files(movement: Any, options: dict[str, Any]) -> None:
@@ -104,40 +79,42 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
         write_view(options["view"], movement)
 
 
-@click.command(cls=GroupedCommand, short_help="Move an arm: joints for a symbol or a recording, checked.")
-@source_options
-@heading("Arm")
+@click.command(cls=opts.GroupedCommand, short_help="Move an arm: joints for a symbol or a recording, checked.")
+@opts.source_options
+@opts.heading("Arm")
 @click.option("--robot", required=True, help="panda, ur5e, wam, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
-@click.option("--from", "start", type=NUMBERS, help="Where the joints stand now.  [default: the rest posture]")
-@click.option("--rest", type=NUMBERS, help="Joints at rest.  [default: of the model, of a file near mid-range]")
-@click.option("--at", type=NUMBERS, help="Start in the frame of the robot.  [default: where the arm does it best]")
+@click.option("--from", "start", type=opts.NUMBERS, help="Where the joints stand now.  [default: the rest posture]")
+@click.option("--rest", type=opts.NUMBERS, help="Joints at rest.  [default: of the model, of a file near mid-range]")
+@click.option("--at", type=opts.NUMBERS, help="Start in the frame of the robot.  [default: where the arm does it best]")
 @click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
-@click.option("--scale", type=Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
+@click.option("--scale", type=opts.Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
 @click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True,
               help="Where the axes of a movement in the plane lie.")  # fmt: skip
-@click.option("--orientation", type=NUMBERS, help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]")
+@click.option(
+    "--orientation", type=opts.NUMBERS, help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]"
+)
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
               help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
 @click.option("--joints", is_flag=True, help="SOURCE moves the joints, not the tip.  [default: by its columns]")
 @click.option("--joint-units", type=click.Choice(["deg", "rad", "percent"]),
               help="Of joints whose columns say no unit, and of --lerobot. percent: -100 to 100 between the limits of "
               "the URDF, as LeRobot calibrates.  [default: rad; of shoulder_pan.pos and --lerobot deg]")  # fmt: skip
-@click.option("--max-velocity", type=Finite(), help="Of every joint, below what the model allows.")
-@click.option("--max-acceleration", type=Finite(), help="The same for accelerations.")
-@heading("Movement")
-@click.option("--goal", type=NUMBERS, help="End in the frame of the robot.  [default: as demonstrated]")
-@click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
+@click.option("--max-velocity", type=opts.Finite(), help="Of every joint, below what the model allows.")
+@click.option("--max-acceleration", type=opts.Finite(), help="The same for accelerations.")
+@opts.heading("Movement")
+@click.option("--goal", type=opts.NUMBERS, help="End in the frame of the robot.  [default: as demonstrated]")
+@click.option("--duration", type=opts.Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--slow-down", is_flag=True, help="Slow the movement down as far as limits demand.")
 @click.option("--fastest", is_flag=True, help="Pass the path in the least time that the limits allow.")
-@click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second.")
-@specification_options
+@click.option("--rate", type=opts.Finite(), default=100.0, show_default=True, help="Samples per second.")
+@opts.specification_options
 @layout_options
-@heading("Output")
+@opts.heading("Output")
 @file_options
-@click.option("--lerobot", type=FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
-@click.option("--fps", type=Finite(), default=30.0, show_default=True, help="Frames per second of that data set.")
-@json_option
+@click.option("--lerobot", type=opts.FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
+@click.option("--fps", type=opts.Finite(), default=30.0, show_default=True, help="Frames per second of that data set.")
+@opts.json_option
 @click.option("--overwrite", is_flag=True, help="Write over files that are there; never over the input.")
 @click.option("--force", is_flag=True, help="Write what fails a check too, and over files that are there.")
 def move(**options: Any) -> None:

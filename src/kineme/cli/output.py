@@ -29,10 +29,31 @@ def write(text: Any = "", *, err: bool = False) -> None:
     click.echo(printable_lines(text), err=err)
 
 
-def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
-    """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file."""
+def check_new(
+    path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force", endings: Sequence[str] = (),
+    flag: str | None = None,
+) -> None:  # fmt: skip
+    """Refuse to write over an input, or a file in one, and without --force, or what `remedy` names, over any file.
+
+    With `endings`, "" of a folder, the path of an option `flag` has one of them, and its folder is there.
+    """
     if path is None or str(path) == "-":
         return
+    if path.exists() and any(Path(source).exists() and path.samefile(source) for source in inputs):
+        raise click.UsageError(f"expected another file to write than the input {printable(path)}")
+    around = [source for source in inputs if Path(source).is_dir() and Path(source).resolve() in path.resolve().parents]
+    if path.is_file() and around:
+        raise click.UsageError(
+            f"expected another file to write than {printable(path)}, one of the input {printable(around[0])}"
+        )
+    if endings:
+        if path.suffix.lower() not in endings:
+            expected = ", ".join(ending or "a folder" for ending in endings)
+            raise click.BadParameter(f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=flag)
+        if path.is_dir():
+            raise click.UsageError(f"expected a new file or folder to write, {printable(path)} is there")
+        if not path.absolute().parent.is_dir():
+            raise click.UsageError(f"expected a folder to write {printable(path)} into, there is none; create it")
     if not path.exists():
         parent = next(folder for folder in path.absolute().parents if folder.exists())
         if not os.access(parent, os.W_OK):
@@ -40,19 +61,8 @@ def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str =
                 f"expected a folder that can be written, {printable(parent)} is read-only; allow writing there, or "
                 "choose another folder"
             )
-        return
-    if any(Path(source).exists() and path.samefile(source) for source in inputs):
-        raise click.UsageError(f"expected another file to write than the input {printable(path)}")
-    if path.is_file() and (inside := next((source for source in inputs if _holds(source, path)), None)) is not None:
-        raise click.UsageError(
-            f"expected another file to write than {printable(path)}, one of the input {printable(inside)}"
-        )
     if not force and path.is_file():
         raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")
-
-
-def _holds(source: str | Path, path: Path) -> bool:
-    return Path(source).is_dir() and Path(source).resolve() in path.resolve().parents
 
 
 def write_bytes(data: bytes) -> None:

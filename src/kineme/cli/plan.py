@@ -7,35 +7,28 @@ from typing import Any
 
 import click
 
+from kineme.cli import options as opts
 from kineme.cli.operators import opened_domain
-from kineme.cli.options import (
-    FILE,
-    Finite,
-    GroupedCommand,
-    force_option,
-    heading,
-    json_option,
-    library_option_of,
-    plot_option,
-)
 from kineme.cli.output import check_new, say, table
 from kineme.reporting.text import counted, printable
 
 
-@click.command(cls=GroupedCommand, short_help="Find the symbols that reach a goal.")
-@click.argument("domain", type=FILE)
-@click.argument("problem", type=FILE, required=False)
-@library_option_of(required=False, words="Folder of the action library: says which demonstration each step follows.")
-@click.option("--state", type=FILE, help="The state now: a table whose columns are those of the states.")
+@click.command(cls=opts.GroupedCommand, short_help="Find the symbols that reach a goal.")
+@click.argument("domain", type=opts.FILE)
+@click.argument("problem", type=opts.FILE, required=False)
+@opts.library_option_of(
+    required=False, words="Folder of the action library: says which demonstration each step follows."
+)
+@click.option("--state", type=opts.FILE, help="The state now: a table whose columns are those of the states.")
 @click.option("--goal", help="The goal, instead of PROBLEM: (and (sweet cup) (sweet mug)).")
 @click.option("--planner", help="An engine of unified-planning that is installed, as aries.")
-@click.option("--timeout", type=Finite(0.1), default=30.0, show_default=True, help="Seconds to plan.")
-@heading("Output")
-@click.option("--output", "-o", type=FILE, help="A .json file, which kineme execute reads, or an .xml file, a behavior "
-              "tree.")  # fmt: skip
-@plot_option
-@json_option
-@force_option
+@click.option("--timeout", type=opts.Finite(0.1), default=30.0, show_default=True, help="Seconds to plan.")
+@opts.heading("Output")
+@click.option("--output", "-o", type=opts.FILE, help="A .json file, which kineme execute reads, or an .xml file, a "
+              "behavior tree.")  # fmt: skip
+@opts.plot_option
+@opts.json_option
+@opts.force_option
 def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, **options: Any) -> None:
     """Find the symbols of DOMAIN, a .pddl file of kineme operators, that reach a goal, each within what was shown.
 

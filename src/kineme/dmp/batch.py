@@ -133,13 +133,9 @@ class Batch:
     def concatenate(cls, batches: Iterable[Self]) -> Self:
         """Concatenate several batches, in the order given.
 
-        Raises
-        ------
-        SpecificationError
-            Batches of different specifications: their weights are not comparable.
-        TrajectoryError
-            No batch, something that is not a batch, batches of different dimensions, labels on some batches only;
-            channels that are known to differ, as joint angles and positions.
+        Raises `SpecificationError`: batches of different specifications: their weights are not comparable. Raises
+        `TrajectoryError`: no batch, something that is not a batch, batches of different dimensions, labels on some
+        batches only; channels that are known to differ, as joint angles and positions.
         """
         batches = list(batches)
         if not batches or not all(isinstance(batch, cls) for batch in batches):
@@ -181,31 +177,31 @@ class Batch:
     def save(self, path: str | Path) -> Path:
         """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
 
-        Raises
-        ------
-        DataError
-            Labels or preprocessing steps that plain data cannot hold.
-        OSError
-            The file cannot be written; what was there before stays.
+        Raises `DataError`: labels or preprocessing steps that plain data cannot hold. Raises `OSError`: the file cannot
+        be written; what was there before stays.
         """
         from kineme.io.arrays.npz import write_container  # files load when they are used
 
         arrays = {name: self.row(name) for name in self.ROWS}
         if self.recorded_as is not None and self.recorded_as.steps is not None:
             arrays |= {name: getattr(self.recorded_as.steps, field) for name, field in _STEPS_OF.items()}
-        header = header_of(self.dmp, self.labels, self.names, self.channels)
+        plain = None if self.labels is None else np.asarray(self.labels).tolist()
+        if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
+            raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
+        header = {
+            "dmp": specification_to_dict(self.dmp),
+            "labels": plain,
+            "names": None if self.names is None else list(self.names),
+            "channels": None if self.channels is None else channels_to_data(self.channels),
+        }
         return write_container(Path(path), self.KIND, header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a file of `save`. The file is data: nothing in it is executed.
 
-        Raises
-        ------
-        DataError
-            The file is foreign, truncated, damaged, of another kind or of a later version; or it is a folder.
-        FileNotFoundError
-            There is no such file.
+        Raises `DataError`: the file is foreign, truncated, damaged, of another kind or of a later version; or it is a
+        folder. Raises `FileNotFoundError`: there is no such file.
         """
         from kineme.io.arrays.npz import read_container
 
@@ -248,19 +244,6 @@ class Batch:
             None if names is None else tuple(names),
             about,
         )
-
-
-def header_of(dmp: Any, labels: NDArray[Any] | None, names: Names, channels: Channels | None) -> dict[str, Any]:
-    """Specification, labels, names and channels of a batch as plain data."""
-    plain = None if labels is None else np.asarray(labels).tolist()
-    if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
-        raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
-    return {
-        "dmp": specification_to_dict(dmp),
-        "labels": plain,
-        "names": None if names is None else list(names),
-        "channels": None if channels is None else channels_to_data(channels),
-    }
 
 
 def recorded_as_from(header: dict[str, Any], arrays: Arrays, n: int, n_dims: int) -> RecordedAs | None:

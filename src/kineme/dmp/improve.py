@@ -108,16 +108,12 @@ _WIDEST = 1e3  # extents
 class Improvement:
     """Result of `improve`.
 
-    Attributes
-    ----------
-    primitive : Primitives
-        The variant with the least cost of all that were tried, a batch of one.
-    costs : ndarray of shape (u, n)
-        Cost of each variant in each update; the first of a row is the center, the very first the primitive as it was.
-    exploration : ndarray of shape (u,)
-        Standard deviation of the paths in each update, where it is largest, as a share of the movement's extent.
-    stopped : str
-        Why there were no more updates.
+    - `primitive`: the variant with the least cost of all that were tried, a batch of one.
+    - `costs` (u, n): cost of each variant in each update; the first of a row is the center, the very first the
+      primitive as it was.
+    - `exploration` (u,): standard deviation of the paths in each update, where it is largest, as a share of the
+      movement's extent.
+    - `stopped`: why there were no more updates.
     """
 
     primitive: Primitives

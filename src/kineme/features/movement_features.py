@@ -90,12 +90,8 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
     def set_params(self, **parameters: Any) -> Self:
         """Set parameters by name; ``dmp__n_basis`` and so on replace a field of `dmp`.
 
-        Raises
-        ------
-        ValueError
-            A name that is no parameter.
-        SpecificationError
-            A value out of the range of a field.
+        Raises `ValueError`: a name that is no parameter. Raises `SpecificationError`: a value out of the range of a
+        field.
         """
         nested, others = self._nested(parameters)
         super().set_params(**others)
@@ -115,12 +111,8 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
     def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
-        Raises
-        ------
-        TrajectoryError
-            Movements that cannot be used, or of other dimensions than those of `fit`.
-        DegenerateMovementError
-            Weights or forcing in the original formulation where ``g = x0``.
+        Raises `TrajectoryError`: movements that cannot be used, or of other dimensions than those of `fit`. Raises
+        `DegenerateMovementError`: weights or forcing in the original formulation where ``g = x0``.
         """
         check_is_fitted(self)
         demonstrations = Demonstrations.of(X)
@@ -224,10 +216,7 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and choose the dimension to align on; y is ignored.
 
-        Raises
-        ------
-        TrajectoryError
-            Recordings that cannot be used; see `RhythmicDMP.learn`.
+        Raises `TrajectoryError`: recordings that cannot be used; see `RhythmicDMP.learn`.
         """
         super().fit(demonstrations := Demonstrations.of(X))
         if self.dmp_.align_on is None:
@@ -283,10 +272,7 @@ class PoseFeatures(_TakesMovements):
     def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S) with d = 3 (orientations) or 6 (poses); see `DMPFeatures`.
 
-        Raises
-        ------
-        TrajectoryError
-            Movements that cannot be used, or orientations where `fit` saw poses.
+        Raises `TrajectoryError`: movements that cannot be used, or orientations where `fit` saw poses.
         """
         check_is_fitted(self)
         demonstrations = as_poses(X)

@@ -111,7 +111,8 @@ def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: Lab
             near = old[best] if best >= 0 and shares[best] >= _MOVED else None
             if near is not None:
                 replaced.add(best)
-            if near is not None and near.row.label == new.row.label and _same_ends(near, new):
+            ends = 0 if near is None else max(abs(near.start - new.start), abs(near.stop - new.stop))
+            if near is not None and near.row.label == new.row.label and ends <= _SAME:
                 unchanged += 1
             elif (kind := _kind(near, new)) is not None:
                 changes.append(Change(kind, new, None if near is None else near.row.label))
@@ -127,10 +128,6 @@ def _shared(a: Stretch, b: Stretch) -> float:
     """Return intersection over union."""
     both = min(a.stop, b.stop) - max(a.start, b.start)
     return max(both, 0) / (max(a.stop, b.stop) - min(a.start, b.start))
-
-
-def _same_ends(a: Stretch, b: Stretch) -> bool:
-    return abs(a.start - b.start) <= _SAME and abs(a.stop - b.stop) <= _SAME
 
 
 def _kind(near: Stretch | None, new: Stretch) -> str | None:

@@ -96,12 +96,8 @@ class Discovery:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, with a row for each segment."""
-        names = [kind.name for kind in self.kinds]
-        rows = (
-            segment._asdict() | {"kind": None if segment.kind is None else names[segment.kind]}
-            for segment in self.segments
-        )
-        return self.summary() | {"segments": list(rows)}
+        names = {None: None} | {k: kind.name for k, kind in enumerate(self.kinds)}
+        return self.summary() | {"segments": [each._asdict() | {"kind": names[each.kind]} for each in self.segments]}
 
 
 class Observation(NamedTuple):
@@ -123,23 +119,9 @@ def discover(
 ) -> Discovery:
     """Find the kinds of movements in episodes, with names that their tasks propose.
 
-    Parameters
-    ----------
-    episodes : iterable of Episode
-        Read once, one at a time.
-    feature : str, optional
-        What kinds are described by, see `state_of`. Columns of grippers, contacts and objects in other features, by
-        their names, help to find boundaries.
-    how : Work, optional
-        How episodes are cut.
-    n_learned : int
-        Pieces that kinds are learned from, about; all are assigned to these kinds.
-
-    Raises
-    ------
-    DataError
-        No episode with movements, or no three that are alike. Episodes that cannot be used are among the problems of
-        the result.
+    Episodes are read once, one at a time; those that cannot be used are among the problems of the result. Kinds are
+    described by a `feature`, see `state_of`; columns of grippers, contacts and objects in other features, by their
+    names, help to find boundaries. They are learned from about `n_learned` pieces; all are assigned to them.
     """
     observations: list[Observation] = []
     problems: list[str] = []
@@ -375,7 +357,7 @@ def store_discovery(
     """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version.
 
     A person names the proposals, in the studio or by ``kineme anchor``. `progress` is called with the number of
-    episodes that are done. Raises `TrajectoryError`: the library holds movements of other columns.
+    episodes that are done.
     """
     by_episode: dict[int, list[Segment]] = {}
     for segment in discovery.segments:

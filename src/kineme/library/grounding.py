@@ -7,10 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kineme.anchoring.grounding import SymbolName, ground, medoid_of
-from kineme.anchoring.space import ConceptualSpace, conceptual_space, morph
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.generate import Learned, has_orientation, learn_one
 from kineme.dmp.recorded_as import recorded_as
@@ -61,14 +60,9 @@ def ground_symbol(
     grounded = symbol(store, who)
     typical = prototype_of(store, grounded)
     members = np.union1d(_some_members(grounded), [typical])
-    grounding = ground(
-        SymbolName(grounded.id, grounded.name, grounded.description, grounded.parents),
-        _primitives(store, members),
-        by=by,
-        units=units,
-        medoid=int(np.searchsorted(members, typical)),
-        like=store.specification.comparison,
-    )
+    name = SymbolName(grounded.id, grounded.name, grounded.description, grounded.parents)
+    medoid, like = int(np.searchsorted(members, typical)), store.specification.comparison
+    grounding = ground(name, _primitives(store, members), by=by, units=units, medoid=medoid, like=like)
     grounding["prototype"]["medoid"] = typical  # its id, for queries to the library
     return grounding
 
@@ -83,11 +77,6 @@ def space_of(store: Store) -> ConceptualSpace:
         )
     prototypes = described(store, [prototype_of(store, each) for each in shown])
     return conceptual_space([each.name for each in shown], prototypes, store.specification.comparison)
-
-
-def morph_symbols(store: Store, a: str, b: str, shares: ArrayLike) -> Primitives:
-    """Return movements between two symbols; see `ActionLibrary.morph`."""
-    return morph(primitive_of(store, a), primitive_of(store, b), shares, store.specification.comparison)
 
 
 def _some_members(of_symbol: Symbol) -> Ids:

@@ -20,17 +20,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.io.reading.merge_files import Recordings
-from kineme.library.commit import (
-    Batch,
-    Committed,
-    check,
-    commit,
-    evenly_sampled,
-    find_stored,
-    relative_times,
-    serialize_new,
-    stored_times,
-)
+from kineme.library import commit
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
@@ -58,16 +48,10 @@ _BATCH_SAMPLES = 2_000_000
 class LearnReport:
     """The result of learning.
 
-    Attributes
-    ----------
-    added, duplicates : int
-        Number of movements that were stored, and of those that were stored before.
-    symbols : tuple of str
-        Names of new symbols.
-    ids : ndarray of shape (n,)
-        Ids of the movements in the given order; for movements stored before, the existing id.
-    version : int
-        Version that this call made, the last one of several; where nothing changed, the one that it found.
+    - `added`, `duplicates`: number of movements that were stored, and of those that were stored before.
+    - `symbols`: names of new ones.
+    - `ids` (n,): of the movements in the given order; for movements stored before, the existing id.
+    - `version`: that this call made, the last one of several; where nothing changed, the one that it found.
     """
 
     added: int
@@ -91,16 +75,18 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     before = store.version
     demos = in_columns_of(store, Demonstrations.of(movements))
     check_channels(store, demos)
-    check(demos)
+    commit.check(demos)
     names = as_names(demos, "label", demos.labels if labels is None else labels)
     people = as_names(demos, "group", groups)
     sources, where = _as_origins(source, places, len(demos))
     described = (
-        Batch(part, digests(part, evenly_sampled(part)), names[rows], people[rows], sources[rows], where[rows])
+        commit.Batch(
+            part, digests(part, commit.evenly_sampled(part)), names[rows], people[rows], sources[rows], where[rows]
+        )
         for rows in batches(demos.lengths, min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-len(demos) // 4))))
         for part in [Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))]
     )
-    reports: list[Committed] = []
+    reports: list[commit.Committed] = []
     done = 0
     for report in commit_batches(store, described):
         reports.append(report)
@@ -126,27 +112,27 @@ def batches(lengths: NDArray[np.intp], most: int = _BATCH_MOVEMENTS) -> Iterator
         start = stop
 
 
-def commit_batches(store: Store, several: Iterable[Batch]) -> Iterator[Committed]:
+def commit_batches(store: Store, several: Iterable[commit.Batch]) -> Iterator[commit.Committed]:
     """Commit batches one after the other: one is written while what is new in the next one is serialized.
 
     An undo takes back all of them. Of a batch that has all of its rows already, none is made.
     """
     with ThreadPoolExecutor(1, "kineme-library") as pool:
-        pending: Future[Committed] | None = None
+        pending: Future[commit.Committed] | None = None
         version = None
         for batch in several:
             with store.reading() as connection:
-                stored = find_stored(connection, batch)
+                stored = commit.find_stored(connection, batch)
             new = [i for i in range(len(batch.digests)) if stored.id_of(batch, i) is None]
             if batch.tables:
                 batch.row_of = {i: i for i in new}
             elif new:  # only these are serialized
-                serialize_new(store, batch.demos, batch, new)
+                commit.serialize_new(store, batch.demos, batch, new)
             if pending is not None:
                 report = pending.result()
                 version = report.version or version
                 yield report
-            pending = pool.submit(commit, store, batch, version)
+            pending = pool.submit(commit.commit, store, batch, version)
         if pending is not None:
             yield pending.result()
 
@@ -262,10 +248,10 @@ def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
     positions = starts + (demos.positions - starts).astype(np.float32)
     times = None
     if not even.all():
-        times, offsets = relative_times(demos), demos.offsets.tolist()
+        times, offsets = commit.relative_times(demos), demos.offsets.tolist()
         for i in np.flatnonzero(~even).tolist():  # as `read.movements` gives them
             a, b = offsets[i : i + 2]
-            stored = stored_times(times[a:b])
+            stored = commit.stored_times(times[a:b])
             read = np.frombuffer(stored, np.float32 if len(stored) == 4 * (b - a) else np.float64)
             times[a:b] = (demos.times[a] + read) - demos.times[a]
     mantissas, exponents = np.frexp(demos.durations)  # even stamps say the duration but for rounding

@@ -230,10 +230,6 @@ class ActionLibrary:
         progress : callable, optional
             Called after every batch with the number of movements done and of all.
 
-        Returns
-        -------
-        LearnReport
-
         Raises
         ------
         TrajectoryError
@@ -568,9 +564,10 @@ class ActionLibrary:
 
     def morph(self, a: str, b: str, shares: ArrayLike = 0.5) -> Primitives:
         """Return primitives between two symbols, one for each share of the way: 0 is a, 1 is b."""
-        from kineme.library.grounding import morph_symbols
+        from kineme.anchoring.space import morph
+        from kineme.library.grounding import primitive_of
 
-        return morph_symbols(self.store, a, b, shares)
+        return morph(primitive_of(self.store, a), primitive_of(self.store, b), shares, self.specification.comparison)
 
     def review(self) -> Review:
         """Find symbols whose movements are hard to tell apart, and symbols whose movements form two clusters.

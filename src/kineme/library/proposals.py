@@ -36,14 +36,8 @@ _SAME = 0.8  # share of members in a rejected proposal from which on a proposal 
 class LibraryProposals:
     """Proposals of symbols for movements of a library.
 
-    Indexing gives a `Proposal` whose members and medoid are ids of movements.
-
-    Attributes
-    ----------
-    ids : ndarray of shape (n,)
-        The movements that were considered.
-    by_position : Proposals
-        The same with positions among `ids`, for the pictures of `kineme.anchoring`.
+    Indexing gives a `Proposal` whose members and medoid are ids of movements. `ids` (n,) are the movements that were
+    considered; `by_position` has positions among them, for the pictures of `kineme.anchoring`.
     """
 
     ids: Ids
@@ -293,12 +287,7 @@ def assign_recognized(store: Store, joining: Recognized) -> dict[str, int]:
 class Review:
     """Symbols that could be merged, and symbols that could be split.
 
-    Attributes
-    ----------
-    merges : tuple of Merge
-        See `kineme.anchoring.suggest_merges`.
-    splits : tuple of Split
-        See `kineme.anchoring.suggest_splits`; the parts are ids of movements.
+    See `kineme.anchoring.suggest_merges` and `suggest_splits`; the parts of these are ids of movements.
     """
 
     merges: tuple[assignment.Merge, ...]

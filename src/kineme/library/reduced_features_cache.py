@@ -108,7 +108,6 @@ def _size(kind: type[Any], shape: tuple[int, ...]) -> int:
 
 
 def _arrays_in(store: Store, buffer: Bytes, n: int) -> ReducedMovements:
-    """Return the arrays in a buffer."""
     arrays, offset = [], _HEADER
     for kind, shape in _layout(store, n)[0]:
         count = int(np.prod(shape))

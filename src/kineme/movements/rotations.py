@@ -76,10 +76,7 @@ def rotated(q: ArrayLike, x: ArrayLike) -> Array:
 def normalized(q: ArrayLike) -> Array:
     """Unit quaternions (..., 4), as a copy.
 
-    Raises
-    ------
-    TrajectoryError
-        Not of shape (..., 4), or a norm that differs from 1 by more than `NORM_TOLERANCE`.
+    Raises `TrajectoryError`: not of shape (..., 4), or a norm that differs from 1 by more than `NORM_TOLERANCE`.
     """
     q = as_quaternions(q)
     shape = q.shape[:-1]

@@ -113,10 +113,7 @@ class Draw(_Page):
     def trajectory(self) -> Trajectory:
         """The movement that was drawn last.
 
-        Raises
-        ------
-        DataError
-            Nothing was drawn yet.
+        Raises `DataError`: nothing was drawn yet.
         """
         if not self.drawn:
             raise DataError("expected a movement, got none yet; draw one in the cell of the widget first")
@@ -126,12 +123,7 @@ class Draw(_Page):
     def answer(self) -> Answer:
         """The recognizer's answer to the movement that was drawn last.
 
-        Raises
-        ------
-        DataError
-            Nothing was drawn yet.
-        SpecificationError
-            A widget without a recognizer.
+        Raises `DataError`: nothing was drawn yet. Raises `SpecificationError`: a widget without a recognizer.
         """
         if self.recognizer is None:
             raise SpecificationError(

@@ -64,10 +64,7 @@ def address_of(archive: str, name: str) -> str:
 
 
 def check_apart(output: str | Path, archives: Sequence[str]) -> None:
-    """Refuse a folder of parts within an archive, whose files would become recordings of it.
-
-    Raises `SpecificationError`.
-    """
+    """Refuse a folder of parts within an archive, whose files would become recordings of it."""
     folder = Path(output).resolve()
     for archive in archives:
         if not is_remote(archive) and path_at(archive).resolve() in (folder, *folder.parents):
@@ -81,8 +78,7 @@ def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[
     """List what is to be read in archives, sorted by name, and what cannot be listed.
 
     Only names, sizes and times are looked at, and of folders whether they are data sets. What is in two archives is
-    listed once. Raises `DataError`: nothing is there, a store that does not answer, or a package that reads it is
-    missing.
+    listed once.
     """
     units: list[Unit] = []
     problems: list[Problem] = []

@@ -68,7 +68,6 @@ def described(source: Source, options: Options) -> Iterator[Any]:
 
 
 def _table(columns: Mapping[str, Any], tables: Tables) -> Any:
-    """Return rows of a part."""
     import pyarrow as pa
 
     kinds = {"size": pa.int64(), "digest": pa.int64(), "samples": pa.int64(), "duration": pa.float64()}

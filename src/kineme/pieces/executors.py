@@ -117,10 +117,7 @@ def _outcomes(
 
 @contextmanager
 def _processes(job: Job) -> Iterator[tuple[Callable[[], _Process], _Process]]:
-    """Context manager: a function that starts a process, and the first one. They use one thread each.
-
-    They begin anew, and end when this one does. Raises `SpecificationError`: they do not find the function of the job.
-    """
+    """Context manager: a function that starts a process of one thread, which ends with this one, and the first one."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # they read it when they are imported
     context = get_context("spawn")

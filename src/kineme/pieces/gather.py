@@ -76,10 +76,7 @@ class Checked:
 
 
 def write_run(output: Path, asked: Asked, *, replace: bool = False) -> None:
-    """Write what is asked for into the folder of the parts, or check that it is what the folder has parts of.
-
-    Raises `DataError`: the folder has parts of another command, or of other options, and `replace` is False.
-    """
+    """Write what is asked for into the folder of the parts, or check that it is what the folder has parts of."""
     output.mkdir(parents=True, exist_ok=True)
     text = json.dumps(vars(asked), ensure_ascii=False, sort_keys=True, indent=1)
     with suppress(FileExistsError), whole_file(output / RUN, replace=False) as beside:
@@ -90,13 +87,9 @@ def write_run(output: Path, asked: Asked, *, replace: bool = False) -> None:
             beside.write_text(text, encoding="utf-8")
         return
     before = read_run(output)
-    same = (before.task, _without_version(before.options)) == (asked.task, _without_version(asked.options))
-    if not same:
-        differ = [
-            name
-            for name in sorted({*before.options, *asked.options})
-            if before.options.get(name) != asked.options.get(name)
-        ]
+    if (before.task, _without_version(before.options)) != (asked.task, _without_version(asked.options)):
+        names = sorted({*before.options, *asked.options})
+        differ = [name for name in names if before.options.get(name) != asked.options.get(name)]
         what = f"kineme {before.task}" if before.task != asked.task else f"other options ({', '.join(differ)})"
         raise DataError(
             f"expected a folder for the parts of this command, {output} has those of {what}; name another, or say "
@@ -179,10 +172,7 @@ def _reason(path: Path) -> str:
 
 
 def tables_of(job: Job, of: Checked, columns: Sequence[str] | None = None) -> Iterator[Any]:
-    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan.
-
-    Raises `DataError`: a part has damaged rows.
-    """
+    """Yield the rows of all parts, or some columns of them, one part in memory at a time, in the order of the plan."""
     import pyarrow as pa
     from pyarrow import parquet
 

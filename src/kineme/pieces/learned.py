@@ -228,8 +228,7 @@ def learned(
     """Store the movements of all parts, and yield the labels of each batch with what came of it.
 
     What is described in the columns of the library is written as it is; what is not is described again, from its
-    samples in single precision. Files whose columns do not fit are added to the problems. An undo takes back
-    everything. Raises `DataError`: the library describes movements otherwise; `TrajectoryError`: it has other columns.
+    samples in single precision. Files whose columns do not fit are added to the problems. An undo takes back all.
     """
     store.check_writable()
     if store.specification.to_json() != asked.options["specification"]:

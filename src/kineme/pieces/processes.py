@@ -52,10 +52,7 @@ class Process:
         self._receive(_START)
 
     def search(self, queries: Sequence[Any], k: int) -> list[Candidates]:
-        """Return the best of its groups for each query; a process that has died is started once more.
-
-        Raises `UnavailableError`: that one died, too.
-        """
+        """Return the best of its groups for each query; a process that has died is started once more."""
         for attempt in range(2):
             try:
                 if not self.is_alive():

@@ -109,8 +109,7 @@ class Part(NamedTuple):
 def run_piece(job: Job, piece: Piece) -> Outcome:
     """Do a piece, unless its part is there and fits; whatever goes wrong is a failed outcome, and stops nothing.
 
-    The part appears whole or not at all, and is the same bytes whoever makes it. A file that changes while it is read
-    fails the piece. Raises `OSError` if the disk is full.
+    The part appears whole or not at all, and is the same bytes whoever makes it. A full disk alone is an error here.
     """
     before = time.process_time()
     path = job.path(piece)
@@ -180,14 +179,11 @@ def read_part(path: Path) -> Part | None:
         if path.suffix == ".arrow":
             with pa.memory_map(str(path)) as mapped, ipc.open_file(mapped) as file:
                 metadata = file.schema.metadata
-                rows = -1
         else:
             with parquet.ParquetFile(path) as file:
-                metadata, rows = file.metadata.metadata, file.metadata.num_rows
+                metadata = file.metadata.metadata
         about, report = (json.loads((metadata or {})[key]) for key in (_ABOUT, _REPORT))
-        if rows < 0:
-            rows = int(report["rows"])
-        problems = tuple(map(str, report["problems"]))
+        problems, rows = tuple(map(str, report["problems"])), int(report["rows"])
         return Part(about, problems, int(report["recordings"]), float(report["seconds"]), rows)
     except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError, pa.ArrowException):
         return None

@@ -141,8 +141,7 @@ def write_reduction(folder: Path, reduction: Reduction) -> Path:
 def shared_reduction(folder: Path, store: Store, *, renew: bool = False) -> Reduction:
     """Return what ``bases.npz`` in a folder says; written first if there is none, or `renew` asks for another.
 
-    All jobs that begin at once get the same: that of the first one that has written it. Raises `DataError`: it is of
-    another library.
+    All jobs that begin at once get the same: that of the first one that has written it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     if renew:

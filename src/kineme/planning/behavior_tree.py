@@ -57,17 +57,14 @@ def domain_to_behavior_tree(domain: Domain) -> str:
     for operator in usable:
         tree = SubElement(root, "BehaviorTree", {"ID": f"Do{nodes[operator.name]}"})
         fallback = SubElement(tree, "Fallback", {"name": names.operators[operator.name]})
-        done = SubElement(fallback, "Sequence", {"name": "done"})
-        for literal in operator.effects:
-            conditions.add(_condition(done, literal, names))
-        act = SubElement(fallback, "Sequence", {"name": "act"})
-        for literal in operator.preconditions:
-            conditions.add(_condition(act, literal, names))
+        for name, literals in (("done", operator.effects), ("act", operator.preconditions)):
+            sequence = SubElement(fallback, "Sequence", {"name": name})
+            conditions |= {_condition(sequence, literal, names) for literal in literals}
         ports = {parameter.name: f"{{{parameter.name}}}" for parameter in operator.parameters}
         for what in ("start", "goal") if operator.places else ():
             ports |= {f"{what}_{axis}": f"{{{what}_{axis}}}" for axis in domain.vocabulary.axes}
         SubElement(
-            act, nodes[operator.name],
+            sequence, nodes[operator.name],
             {"name": names.operators[operator.name], **_ports(ports), "duration": repr(operator.duration)},
         )  # fmt: skip
     _model(root, domain, names, usable, sorted(conditions))

@@ -60,23 +60,10 @@ class Evidence(NamedTuple):
 class Operator:
     """One symbol as an action of a planner.
 
-    Attributes
-    ----------
-    name, symbol_id : str
-    parameters : tuple of Parameter
-    preconditions, effects : tuple of Literal
-    duration : float
-        Median [s].
-    begin, end : tuple of k float
-        Hand minus the first place at the start, and minus the last place at the end: medians.
-    displacement : tuple of two tuples of k float
-        Least and largest way of the hand.
-    evidence : tuple of Evidence
-    cannot_tell : tuple of str
-        What the states do not decide.
-    usable : bool
-        Whether a planner gets it: not if an effect came after some movements and not after others.
-    movements : tuple of int
+    - `duration`: median [s]. `displacement` (2, k): least and largest way of the hand.
+    - `begin`, `end` (k,): hand minus the first place at the start, and minus the last place at the end; medians.
+    - `cannot_tell`: what the states do not decide.
+    - `usable`: whether a planner gets it; not if an effect came after some movements and not after others.
     """
 
     name: str
@@ -110,22 +97,12 @@ class Edit(NamedTuple):
 
 @dataclass(frozen=True)
 class Domain:
-    """What a planner knows: operators, what can be said of a state, and places.
-
-    Attributes
-    ----------
-    vocabulary : Vocabulary
-    operators : tuple of Operator
-    places : mapping of str to tuple of k float
-        Places without a fixture that were visited, by name.
-    edits : tuple of Edit
-        Of a person, and already made in `operators`.
-    """
+    """What a planner knows: operators, what can be said of a state, and places."""
 
     vocabulary: Vocabulary
     operators: tuple[Operator, ...]
-    places: Mapping[str, tuple[float, ...]]
-    edits: tuple[Edit, ...] = ()
+    places: Mapping[str, tuple[float, ...]]  # (k,) of each name: places without a fixture that were visited
+    edits: tuple[Edit, ...] = ()  # of a person, and already made in `operators`
 
     def operator(self, name: str) -> Operator:
         """Return the operator of a symbol."""
@@ -230,10 +207,7 @@ def domain_to_dict(domain: Domain) -> dict[str, Any]:
 def domain_from_dict(data: Any) -> Domain:
     """Return the domain of `domain_to_dict`.
 
-    Raises
-    ------
-    DataError
-        Anything else, or a domain of a later version.
+    Raises `DataError`: anything else, or a domain of a later version.
     """
     check_form(data, "domain", FORMAT, VERSION, "write one by kineme operators")
     try:
@@ -244,7 +218,11 @@ def domain_from_dict(data: Any) -> Domain:
             n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
             if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
                 raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
-        operators = tuple(_operator_from(operator) for operator in data["operators"])
+        records = (("parameters", Parameter), ("preconditions", Literal), ("effects", Literal), ("evidence", Evidence))
+        operators = tuple(
+            _record(Operator, row | {part: tuple(_record(of, each) for each in row[part]) for part, of in records})
+            for row in data["operators"]
+        )
         places = {name: tuple(map(float, where)) for name, where in data["places"].items()}
         edits = tuple(_record(Edit, edit | {"literal": _record(Literal, edit["literal"])}) for edit in data["edits"])
         domain = Domain(vocabulary, operators, places, edits)
@@ -268,13 +246,6 @@ def read_json(path: str | Path, what: str) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise DataError(f"expected a {what} in JSON, {path} is none: {error}") from error
-
-
-def _operator_from(data: Mapping[str, Any]) -> Operator:
-    records = {"parameters": Parameter, "preconditions": Literal, "effects": Literal, "evidence": Evidence}
-    return _record(
-        Operator, {**data} | {part: tuple(_record(of, row) for row in data[part]) for part, of in records.items()}
-    )
 
 
 def _record(of: Any, data: Mapping[str, Any]) -> Any:
@@ -304,7 +275,6 @@ def _is_of(value: Any, hint: Any) -> bool:
 
 
 def _positions(domain: Domain) -> list[Sequence[float]]:
-    """List the positions that a domain holds."""
     positions: list[Sequence[float]] = [
         *domain.places.values(),
         *(each.typical for each in domain.vocabulary.variables if each.typical),

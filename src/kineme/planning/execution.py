@@ -82,21 +82,11 @@ class Replan(NamedTuple):
 class Execution:
     """What became of a plan.
 
-    Attributes
-    ----------
-    reached : bool
-        Whether the goal holds, as far as the sensors say.
-    why : str
-        Why it was not reached; empty if it was.
-    attempts : tuple of Attempt
-    replans : tuple of Replan
-    goal : tuple of str
-    state : dict
-        What was seen last.
-    runs : tuple of Run
-        Of the attempts that moved.
-    movements : tuple of RobotMovement
-        What was sent in them; without a world, what would be.
+    - `reached`: whether the goal holds, as far as the sensors say.
+    - `why`: why it was not reached; empty if it was.
+    - `state`: what was seen last.
+    - `runs`: of the attempts that moved.
+    - `movements`: what was sent in them; without a world, what would be.
     """
 
     reached: bool

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,18 +31,9 @@ from numpy.typing import NDArray
 from scipy.special import xlogy
 
 from kineme.library.library import ActionLibrary
+from kineme.planning import vocabulary as words
 from kineme.planning.domain import CHANGED, Domain, Edit, Evidence, Literal, Operator, Parameter, edited
 from kineme.planning.states import States, states_of
-from kineme.planning.vocabulary import (
-    Fact,
-    Vocabulary,
-    facts_of,
-    hand_of,
-    kind_of,
-    places_of,
-    predicates_of,
-    vocabulary_of,
-)
 from kineme.reporting.text import counted
 from kineme.validation import Array, check_number
 
@@ -58,8 +49,8 @@ class Example(NamedTuple):
 
     movement: int
     places: dict[str, Array]
-    before: dict[Fact, bool]
-    after: dict[Fact, bool]
+    before: dict[words.Fact, bool]
+    after: dict[words.Fact, bool]
     hands: tuple[Array, Array]
 
 
@@ -73,29 +64,15 @@ def learn_operators(
 ) -> Domain:
     """Learn an operator for each symbol of a library from the states before and after its movements; see the module.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-    table : str, Path or mapping, optional
-        States beside the recordings; see `states_of`. Without it, the hand and the grippers of the recordings alone.
-    radius : float, optional
-        Of places, in the unit of the recordings; by default where distances of the hand from objects part into near
-        and far, see `vocabulary_of`.
-    error_rate : float, default 0.02
-        Share of facts that a sensor gets wrong; 0 takes each fact as it is.
-    edits : sequence of Edit, optional
-        Of a person, as those of an earlier domain.
+    - `table`: states beside the recordings, see `states_of`; without it the hand and the grippers of the recordings
+      alone.
+    - `radius`: of places, in the unit of the recordings; by default where distances of the hand from objects part into
+      near and far, see `vocabulary_of`.
+    - `error_rate`: share of facts that a sensor gets wrong; 0 takes each fact as it is.
+    - `edits`: of a person, as those of an earlier domain.
 
-    Returns
-    -------
-    Domain
-
-    Raises
-    ------
-    DataError
-        A table that is none, or rows that belong to no movement.
-    SpecificationError
-        No symbol has movements; a radius or an error rate out of range.
+    Raises `DataError`: a table that is none, or rows that belong to no movement. Raises `SpecificationError`: no symbol
+    has movements; a radius or an error rate out of range.
     """
     states = states_of(library, table)
     durations = library.primitives(ids=states.movements).durations
@@ -114,7 +91,7 @@ def operators_of(
 ) -> Domain:
     """Learn operators from states, with the durations of their movements (n,) [s] and the ids of the symbols."""
     check_number("error_rate", error_rate, least=0.0, most=0.25)
-    vocabulary = vocabulary_of(states, radius)
+    vocabulary = words.vocabulary_of(states, radius)
     examples = [_example(vocabulary, states, row) for row in range(len(states))]
     values_of: dict[str, set[bool]] = {}
     for example in examples:
@@ -122,7 +99,7 @@ def operators_of(
             for fact, value in facts.items():
                 values_of.setdefault(fact[0], set()).add(value)
     varied = {predicate for predicate, values in values_of.items() if len(values) == 2}
-    rules = _Rules(predicates_of(vocabulary), varied, error_rate, {*vocabulary.fixtures})
+    rules = _Rules(words.predicates_of(vocabulary), varied, error_rate, {*vocabulary.fixtures})
     operators = []
     for name in dict.fromkeys(sorted(states.symbols)):
         rows = [row for row, symbol in enumerate(states.symbols) if symbol == name]
@@ -132,7 +109,7 @@ def operators_of(
     return edited(domain, edits)
 
 
-def _example(vocabulary: Vocabulary, states: States, row: int) -> Example:
+def _example(vocabulary: words.Vocabulary, states: States, row: int) -> Example:
     moments = [
         {
             name: states.words[name][int(value)] if name in states.words else float(value)
@@ -141,18 +118,13 @@ def _example(vocabulary: Vocabulary, states: States, row: int) -> Example:
         }
         for values in (states.before, states.after)
     ]
-    places = places_of(vocabulary, moments)
-    before, after = (facts_of(vocabulary, moment, places) for moment in moments)
-    return Example(
-        int(states.movements[row]),
-        places,
-        before,
-        after,
-        (hand_of(vocabulary, moments[0]), hand_of(vocabulary, moments[1])),
-    )
+    places = words.places_of(vocabulary, moments)
+    before, after = (words.facts_of(vocabulary, moment, places) for moment in moments)
+    hands = words.hand_of(vocabulary, moments[0]), words.hand_of(vocabulary, moments[1])
+    return Example(int(states.movements[row]), places, before, after, hands)
 
 
-def _holds_at(facts: Mapping[Fact, bool], predicate: str, *known: str) -> list[str]:
+def _holds_at(facts: Mapping[words.Fact, bool], predicate: str, *known: str) -> list[str]:
     """List the last arguments, or of ``in`` the items of a place, with which a predicate is true."""
     if predicate == "in":
         return [fact[1] for fact, value in facts.items() if value and fact[0] == "in" and fact[2] == known[0]]
@@ -245,7 +217,13 @@ def _literals(
 ) -> _Literals:
     """Return what held before all movements, what changed, and the counts."""
     literals = _Literals([], [], [], [], [])
-    for predicate, arguments in _candidates(rules.predicates, parameters):
+    candidates = (
+        (predicate, tuple(parameter.name for parameter in chosen))
+        for predicate, types in rules.predicates.items()
+        for chosen in itertools.permutations(parameters, len(types))
+        if tuple(parameter.type for parameter in chosen) == types
+    )
+    for predicate, arguments in candidates:
         facts = [(predicate, *(each[argument] for argument in arguments)) for _, each in pairs]
         known = [
             (example.movement, example.before[fact], example.after[fact])
@@ -323,24 +301,14 @@ def _regularity(counts: NDArray[np.int_], error_rate: float) -> tuple[bool | Non
 def _parameter(role: str, pairs: Sequence[tuple[Example, Mapping[str, str]]], fixtures: set[str]) -> Parameter:
     is_place = role in _PLACES
     names = [each[role] for _, each in pairs]
-    kinds = tuple(sorted({"" if is_place and name not in fixtures else kind_of(name) for name in names}))
+    kinds = tuple(sorted({"" if is_place and name not in fixtures else words.kind_of(name) for name in names}))
     if not is_place:
         return Parameter(role, "item", kinds)
     where = np.array([example.places[each[role]] for example, each in pairs])
     return Parameter(role, "place", kinds, tuple(where.min(axis=0).tolist()), tuple(where.max(axis=0).tolist()))
 
 
-def _candidates(
-    predicates: Mapping[str, tuple[str, ...]], parameters: Sequence[Parameter]
-) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each predicate with each choice of parameters of its types."""
-    for predicate, types in predicates.items():
-        for chosen in itertools.permutations(parameters, len(types)):
-            if tuple(parameter.type for parameter in chosen) == types:
-                yield predicate, tuple(parameter.name for parameter in chosen)
-
-
-def _visited(vocabulary: Vocabulary, examples: Iterable[Example]) -> dict[str, tuple[float, ...]]:
+def _visited(vocabulary: words.Vocabulary, examples: Iterable[Example]) -> dict[str, tuple[float, ...]]:
     """Return the places without a fixture that were visited, the means of what lies within the radius."""
     fixtures = {*vocabulary.fixtures}
     places = [where for each in examples for name, where in each.places.items() if name not in fixtures]

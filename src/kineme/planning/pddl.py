@@ -43,13 +43,7 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
 
 
 class Names:
-    """Identifiers of what a domain names, each of its own, as planners want them.
-
-    Raises
-    ------
-    SpecificationError
-        Literals of one predicate whose arguments are of different types, or no parameters.
-    """
+    """Identifiers of what a domain names, each of its own, as planners want them."""
 
     def __init__(self, domain: Domain, objects: Iterable[str] = ()) -> None:
         self.types = predicates_of(domain.vocabulary)
@@ -76,16 +70,13 @@ def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
     names = Names(domain)
     predicates = [_typed(names.predicates[predicate], types) for predicate, types in names.types.items()]
     usable = [operator for operator in domain.operators if operator.usable]
+    predicates += [_typed(names.shown[each.name], [p.type for p in each.parameters]) for each in usable]
     lines = [
         f"(define (domain {identifiers([name])[name]})",
         "  (:requirements :strips :typing :negative-preconditions :action-costs)",
         "  (:types place item)",
         "  (:predicates",
         *(f"    {text}" for text in predicates),
-        *(
-            f"    {_typed(names.shown[operator.name], [parameter.type for parameter in operator.parameters])}"
-            for operator in usable
-        ),
         "  )",
         "  (:functions (total-cost) - number)",
     ]
@@ -164,13 +155,7 @@ def problem_to_pddl(
 
 
 def parsed(text: str) -> Any:
-    """Return one expression of PDDL as nested lists of words, in small letters.
-
-    Raises
-    ------
-    DataError
-        Parentheses that do not fit, several expressions, or none.
-    """
+    """Return one expression of PDDL as nested lists of words, in small letters."""
     stack: list[list[Any]] = [[]]
     for number, token in enumerate(match[0] for match in _TOKEN.finditer(text.lstrip("\ufeff"))):
         if number > _MOST_TOKENS or len(stack) > _DEEPEST:
@@ -190,13 +175,7 @@ def parsed(text: str) -> Any:
 
 
 def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
-    """Return the literals of a conjunction, as ``(and (in cup shelf) (not (full cup)))``: words, and whether true.
-
-    Raises
-    ------
-    DataError
-        Anything else than a literal or a conjunction of literals.
-    """
+    """Return the literals of a conjunction, as ``(and (in cup shelf) (not (full cup)))``: words, and whether true."""
     if isinstance(expression, list) and expression and expression[0] == "and":
         return [literal for part in expression[1:] for literal in literals_of(part)]
     if isinstance(expression, list) and len(expression) == 2 and expression[0] == "not":
@@ -230,7 +209,8 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
     names = Names(domain)
     sections = _sections(parsed(text), "domain").get(":action", [])
     actions = {part[0]: part[1:] for part in sections if part and isinstance(part[0], str)}
-    written = [names.operators[operator.name] for operator in domain.operators if operator.usable]
+    usable = [operator for operator in domain.operators if operator.usable]
+    written = [names.operators[operator.name] for operator in usable]
     if actions.keys() != {*written} or len(sections) != len(written):
         raise DataError(
             f"expected the actions that kineme operators wrote, {first_names(written, 8)}, each once, got "
@@ -238,9 +218,7 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
         )
     predicate_of = {text: name for name, text in names.predicates.items()}
     edits = []
-    for operator in domain.operators:
-        if not operator.usable:
-            continue
+    for operator in usable:
         action = actions[names.operators[operator.name]]
         content = {action[k]: action[k + 1] for k in range(0, len(action) - 1, 2) if isinstance(action[k], str)}
         for part, learned in (("precondition", operator.preconditions), ("effect", operator.effects)):
@@ -271,13 +249,7 @@ def _conjuncts(expression: Any) -> list[Any]:
 
 
 def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tuple[tuple[str, ...], bool]]]:
-    """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out.
-
-    Raises
-    ------
-    DataError
-        No problem, or a goal that is no conjunction of literals.
-    """
+    """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out."""
     sections = _sections(parsed(text), "problem")
     if not any(sections.get(":goal", [])):
         raise DataError("expected a problem with a goal, got none; add (:goal ...)")

@@ -1,10 +1,15 @@
-"""Plans: a planner's steps as places that the hand goes to, and their checks."""
+"""Plans: a planner's steps as places that the hand goes to, their checks, and what keeps a goal from being reached.
+
+For the latter, operators are applied as if nothing were ever undone (the delete relaxation: B. Bonet and H. Geffner,
+"Planning as Heuristic Search", Artificial Intelligence 129, 2001): what is not reached so is reached by no plan.
+"""
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,22 +18,16 @@ import numpy as np
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.records import needs
-from kineme.planning.domain import (
-    Operator,
-    check_positions,
-    domain_from_dict,
-    domain_to_dict,
-    hands_of,
-    is_shown,
-    read_json,
-)  # fmt: skip
+from kineme.planning import domain as domains
 from kineme.planning.pddl import Names, domain_to_pddl, name_of, problem_to_pddl
-from kineme.planning.problem import Goal, Problem, facts_after, shown_arguments, unmet
-from kineme.planning.reachability import unreachable
+from kineme.planning.problem import Goal, Problem, facts_after, ground, shown_arguments, unmet
+from kineme.planning.vocabulary import Fact
 from kineme.reporting.text import first_names
 from kineme.validation import Array, check_form, check_number
 
 FORMAT, VERSION = "kineme-plan", 1
+_TRIED = 500  # operators with arguments that are looked at for why a goal is not reached
+_DEEPEST = 6  # operators one before the other that this names
 
 
 class Step(NamedTuple):
@@ -46,14 +45,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Steps from the state now to a goal.
-
-    Attributes
-    ----------
-    problem : Problem
-    steps : tuple of Step
-    planner : str
-    """
+    """Steps from the state now to a goal."""
 
     problem: Problem
     steps: tuple[Step, ...]
@@ -71,21 +63,13 @@ class Plan:
 def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.0) -> Plan:
     """Find a plan by a planner of unified-planning, and check each of its steps.
 
-    Parameters
-    ----------
-    problem : Problem
-    planner : str, optional
-        Name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the problem as it
-        is, else one that takes it without costs and negative preconditions.
-    timeout : float, default 30.0
-        [s], half of it with costs.
+    - `planner`: name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the
+      problem as it is, else one that takes it without costs and negative preconditions.
+    - `timeout`: [s], half of it with costs.
 
-    Raises
-    ------
-    SpecificationError
-        There is no plan, with the goals that no order of operators reaches; or a step depends on what is not known.
-    DataError
-        The extra ``planner`` is not installed, no engine takes the problem, or none finds a plan in time.
+    Raises `SpecificationError`: there is no plan, with the goals that no order of operators reaches; or a step depends
+    on what is not known. Raises `DataError`: the extra ``planner`` is not installed, no engine takes the problem, or
+    none finds a plan in time.
     """
     check_number("timeout", timeout, least=0.1)
     if all(problem.facts.get(goal.fact) is goal.value for goal in problem.goal):
@@ -114,9 +98,9 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
     return plan
 
 
-def step_of(operator: Operator, arguments: dict[str, str], places: Mapping[str, Array]) -> Step:
+def step_of(operator: domains.Operator, arguments: dict[str, str], places: Mapping[str, Array]) -> Step:
     """Return an operator with arguments as a step: where the hand begins and ends."""
-    ends = hands_of(operator, arguments, places)
+    ends = domains.hands_of(operator, arguments, places)
     start, goal = ((), ()) if ends is None else (tuple(ends[0].tolist()), tuple(ends[1].tolist()))
     return Step(operator.name, arguments, start, goal, operator.duration)
 
@@ -185,17 +169,11 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
 
 
 def check_plan(plan: Plan) -> None:
-    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so.
-
-    Raises
-    ------
-    SpecificationError
-        The first such step with all reasons, or the goals that are missed.
-    """
+    """Refuse a plan that misses its goal, or with a step that is not known to be possible or was not shown so."""
     domain, facts = plan.problem.domain, dict(plan.problem.facts)
     for number, step in enumerate(plan.steps, 1):
         operator = domain.operator(step.operator)
-        reasons = unmet(facts, operator, step.arguments) + is_shown(
+        reasons = unmet(facts, operator, step.arguments) + domains.is_shown(
             domain, operator, step.arguments, plan.problem.places
         )
         if reasons:
@@ -211,33 +189,26 @@ def plan_to_dict(plan: Plan) -> dict[str, Any]:
     """Return a plan with its problem and domain as plain data that JSON can hold; `plan_from_dict` reads it."""
     problem = plan.problem
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "planner": plan.planner,
-        "duration": plan.duration,
+        **{"format": FORMAT, "version": VERSION, "planner": plan.planner, "duration": plan.duration},
         "steps": [step._asdict() | {"start": [*step.start], "goal": [*step.goal]} for step in plan.steps],
         "goal": [{"fact": [*goal.fact], "value": goal.value} for goal in problem.goal],
         "places": {name: where.tolist() for name, where in problem.places.items()},
         "facts": [{"fact": [*fact], "value": value} for fact, value in problem.facts.items()],
-        "domain": domain_to_dict(problem.domain),
+        "domain": domains.domain_to_dict(problem.domain),
     }
 
 
 def plan_from_dict(data: Any) -> Plan:
     """Return the plan of `plan_to_dict`, checked.
 
-    Raises
-    ------
-    DataError
-        Anything else, or a plan of a later version.
-    SpecificationError
-        A step that cannot be done; see `check_plan`.
+    Raises `DataError`: anything else, or a plan of a later version. Raises `SpecificationError`: a step that cannot be
+    done; see `check_plan`.
     """
     check_form(data, "plan", FORMAT, VERSION)
     try:
-        domain = domain_from_dict(data["domain"])
+        domain = domains.domain_from_dict(data["domain"])
         places = {str(name): np.array(where, dtype=np.float64) for name, where in data["places"].items()}
-        check_positions(domain.vocabulary.axes, places.values())
+        domains.check_positions(domain.vocabulary.axes, places.values())
         facts = {tuple(map(str, each["fact"])): bool(each["value"]) for each in data["facts"]}
         goals = tuple(Goal(tuple(map(str, each["fact"])), bool(each["value"])) for each in data["goal"])
         rows = [(domain.operator(step["operator"]), dict(step["arguments"])) for step in data["steps"]]
@@ -253,4 +224,65 @@ def plan_from_dict(data: Any) -> Plan:
 
 def read_plan(path: str | Path) -> Plan:
     """Return the plan in a JSON file; see `plan_from_dict`."""
-    return plan_from_dict(read_json(path, "plan"))
+    return plan_from_dict(domains.read_json(path, "plan"))
+
+
+def unreachable(problem: Problem, shown: Sequence[tuple[domains.Operator, dict[str, str]]]) -> list[str]:
+    """Say which goals no order of the operators reaches even if nothing were ever undone, and what is missing."""
+    possible = {*problem.facts.items()}
+    left = list(shown)
+    while ready := [pair for pair in left if possible.issuperset(ground(pair[0].preconditions, pair[1]))]:
+        done = {*map(id, ready)}
+        left = [pair for pair in left if id(pair) not in done]
+        possible |= {each for operator, arguments in ready for each in ground(operator.effects, arguments)}
+    return [
+        f"{goal} {_why_not(problem, goal, possible, left, _DEEPEST)}" for goal in problem.goal if goal not in possible
+    ]
+
+
+def _why_not(
+    problem: Problem,
+    goal: Goal,
+    possible: set[tuple[Fact, bool]],
+    left: Sequence[tuple[domains.Operator, dict[str, str]]],
+    depth: int,
+) -> str:
+    """Say what keeps operators from reaching a fact: what was not shown, what is not known, or what they lack."""
+    ways = [pair for pair in left if goal in ground(pair[0].effects, pair[1])]
+    is_told = not ways and goal.fact in problem.facts  # then what was not shown is the reason, whatever else is missing
+    if reason := _not_shown(problem, goal, possible, len(problem.facts) if is_told else 0):
+        return reason
+    if not ways or not depth:
+        state = "is not known" if goal.fact not in problem.facts else "does not hold now"
+        effects = {each[::2] for operator in problem.domain.operators if operator.usable for each in operator.effects}
+        is_changed = (goal.fact[0], goal.value) in effects
+        return state if is_changed else f"{state}, and no operator that was shown changes that"
+    needs_of = [ground(operator.preconditions, arguments) for operator, arguments in ways]
+    lacking = [[Goal(*each) for each in literals if each not in possible] for literals in needs_of]
+    k = min(range(len(ways)), key=lambda k: len(lacking[k]))
+    others = [pair for pair in left if pair[0] is not ways[k][0]]  # no round trips
+    first = min(lacking[k], key=lambda each: each.fact in problem.facts)  # what is not known comes first
+    name = f"({' '.join((ways[k][0].name, *ways[k][1].values()))})"
+    reason = _why_not(problem, first, possible, others, depth - 1)
+    return f"needs {name}; {Goal(first.fact) if reason.startswith('is not known') else first} {reason}"
+
+
+def _not_shown(problem: Problem, goal: Goal, possible: set[tuple[Fact, bool]], lacking_most: int) -> str:
+    """Name an operator that would reach a fact from here, and why its arguments lie outside what was shown."""
+    of_type = problem.of_type
+    reasons = []
+    for operator in problem.domain.operators:
+        names = [parameter.name for parameter in operator.parameters]
+        for literal in operator.effects if operator.usable else ():
+            if (literal.predicate, literal.value) != (goal.fact[0], goal.value):
+                continue
+            fixed = dict(zip(literal.arguments, goal.fact[1:], strict=True))
+            choices = [[fixed[p.name]] if p.name in fixed else of_type[p.type] for p in operator.parameters]
+            for chosen in itertools.islice(itertools.product(*choices), _TRIED):
+                arguments = dict(zip(names, chosen, strict=True))
+                lacking = sum(each not in possible for each in ground(operator.preconditions, arguments))
+                if len({*chosen}) == len(chosen) and lacking <= lacking_most:
+                    outside = domains.is_shown(problem.domain, operator, arguments, problem.places)
+                    text = f"({' '.join((operator.name, *chosen))}) was not shown so: {first_names(outside, 2)}"
+                    reasons += [(lacking, len(outside), text)] if outside else []
+    return f"is not reached, since {min(reasons)[2]}" if reasons else ""

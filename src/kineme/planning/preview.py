@@ -176,11 +176,6 @@ def preview_skill(  # noqa: PLR0913, PLR0917 - all that a movement depends on
     """Generate a movement of a skill in `duration` [s], and check it on an arm that stands with `joints` (n,).
 
     Start and goal (k,) are in recorded units. An approach leads to the start; nothing moves.
-
-    Raises
-    ------
-    OutsideError
-        A number outside what was shown.
     """
     check_inside(skill, start, goal, duration)
     movement, refusal = None, ""
@@ -197,13 +192,7 @@ def preview_skill(  # noqa: PLR0913, PLR0917 - all that a movement depends on
 
 
 def plan_symbol(library: ActionLibrary, robot: Robot, who: str, joints: Array) -> RobotMovement:
-    """Return a checked movement of a symbol as it was demonstrated, where the arm, which stands with `joints`, is next.
-
-    Raises
-    ------
-    TrajectoryError
-        The arm cannot execute it.
-    """
+    """Return a checked movement of a symbol as it was demonstrated nearest to where the arm stands with `joints`."""
     skill = skill_of(library, who)
     here = standing_place(library, skill, robot, joints)
     row = 0 if here is None else int(np.linalg.norm(skill.starts - here, axis=1).argmin())

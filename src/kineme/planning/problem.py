@@ -14,7 +14,7 @@ from kineme.planning.domain import Domain, Literal, Operator, is_shown
 from kineme.planning.pddl import Names, literals_of, name_of, parsed, read_problem
 from kineme.planning.states import State
 from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array, as_point
 
 _MOST_GROUND = 200_000  # operators with arguments, at most
 
@@ -32,20 +32,11 @@ class Goal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The state now, in a domain's words, and a goal.
-
-    Attributes
-    ----------
-    domain : Domain
-    places : mapping of str to ndarray of shape (k,)
-    facts : mapping of Fact to bool
-        What is not among them is not known.
-    goal : tuple of Goal
-    """
+    """The state now, in a domain's words, and a goal."""
 
     domain: Domain
-    places: Mapping[str, Array]
-    facts: Mapping[Fact, bool]
+    places: Mapping[str, Array]  # (k,) each
+    facts: Mapping[Fact, bool]  # what is not among them is not known
     goal: tuple[Goal, ...]
 
     @property
@@ -64,27 +55,15 @@ def problem_of(
 ) -> Problem:
     """Return a problem.
 
-    Parameters
-    ----------
-    domain : Domain
-    state : mapping of str to number or word
-        The state now, in the columns of the states that the domain was learned from.
-    goal : str or iterable of Goal
-        A conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
-    places : mapping of str to (k,) positions, optional
-        More places, by name.
+    - `state`: the state now, in the columns of the states that the domain was learned from; numbers and words.
+    - `goal`: facts, or a conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
+    - `places`: positions (k,) of more places, by name.
 
-    Raises
-    ------
-    SpecificationError
-        Names that the domain does not have, or a place without a position.
+    Raises `SpecificationError`: names that the domain does not have, or a place without a position.
     """
     named = {name: np.array(where) for name, where in domain.places.items()}
     for name, where in (places or {}).items():
-        named[name] = as_numbers(where, f"place {name}")
-        if named[name].shape != (len(domain.vocabulary.axes),) or not np.isfinite(named[name]).all():
-            axes = ", ".join(domain.vocabulary.axes)
-            raise SpecificationError(f"expected the place {name} as finite numbers for {axes}, got {where!r}")
+        named[name] = as_point(f"the place {name}", where, domain.vocabulary.axes)
     at = _places_now(domain, state, named)
     problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
     if isinstance(goal, str):
@@ -102,7 +81,8 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     """
     objects, facts, goals = read_problem(text)
     named = {name: np.array(where) for name, where in domain.places.items()}
-    at = _places_now(domain, state, named) if state is not None else _typical_places(domain)
+    at = named | {each.name: np.array(each.typical) for each in domain.vocabulary.of_kind("fixture") if each.typical}
+    at = at if state is None else _places_now(domain, state, named)
     problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
     names = Names(domain, problem.objects)
     for identifier in objects:
@@ -123,15 +103,6 @@ def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dic
         for fact, value in facts_of(vocabulary, state, places).items()
         if value and fact[0] == "in" and fact[2] not in vocabulary.fixtures
     }
-
-
-def _typical_places(domain: Domain) -> dict[str, Array]:
-    """Return the places of a domain without a state: fixtures in the middle of where they were shown."""
-    places = {name: np.array(where) for name, where in domain.places.items()}
-    for fixture in domain.vocabulary.of_kind("fixture"):
-        if fixture.typical:
-            places[fixture.name] = np.array(fixture.typical)
-    return places
 
 
 def _all_facts(problem: Problem) -> list[Fact]:

@@ -15,7 +15,6 @@ from kineme.planning.under_way import frame_of
 from kineme.planning.vocabulary import Fact, Vocabulary
 from kineme.robots.kinematics.descent import InverseKinematics, point_in_words, reaching_postures
 from kineme.robots.simulation import Simulation
-from kineme.validation import Array
 
 _FORM = "push:FX,FY,FZ@SECONDS, OBJECT:X,Y,Z@SECONDS or OBJECT:gone@SECONDS"
 
@@ -33,10 +32,7 @@ def simulation_of(
     `origin` (3,) is that of the plan in the frame of the robot [m], and `follow` how much of the orientation, as in
     `execute`.
 
-    Raises
-    ------
-    SpecificationError
-        A first place out of reach.
+    Raises `SpecificationError`: a first place out of reach.
     """
     problem = plan.problem
     frame, vocabulary = frame_of(plan, origin), problem.domain.vocabulary
@@ -45,7 +41,10 @@ def simulation_of(
     objects |= {fact[1]: places[fact[2]] for fact, value in problem.facts.items() if value and fact[0] == "in"}
     joints = robot.rest
     if plan.steps and plan.steps[0].start:
-        joints = _posture(robot, joints, frame.to_robot(np.array(plan.steps[0].start)), follow)
+        ik, position = InverseKinematics(robot, follow), frame.to_robot(np.array(plan.steps[0].start))
+        what = f"the place where the plan begins, {point_in_words(position)} m"
+        reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
+        joints = reached[int(np.argmin(np.abs(reached - joints).max(axis=1)))]  # the nearest, turned as at rest
     held = [fact[1] for fact, value in problem.facts.items() if value and fact[0] == "holding"]
     tip = Simulation(robot, start=joints).state()
     objects |= dict.fromkeys(held, np.array([tip[f"tip_{axis}"] for axis in "xyz"]))
@@ -60,14 +59,6 @@ def simulation_of(
     )  # fmt: skip
     simulation.grip(bool(held))
     return simulation
-
-
-def _posture(robot: Any, joints: Array, position: Array, follow: str) -> Array:
-    """Return the joints, nearest to some, that bring the tip to a position, turned as at rest."""
-    ik = InverseKinematics(robot, follow)
-    what = f"the place where the plan begins, {point_in_words(position)} m"
-    reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
-    return np.asarray(reached[int(np.argmin(np.abs(reached - joints).max(axis=1)))])
 
 
 def assume_flags(simulation: Simulation, plan: Plan) -> Callable[[Step], None]:
@@ -102,10 +93,7 @@ def _flags(vocabulary: Vocabulary, facts: Mapping[Fact, bool]) -> dict[str, Any]
 def disturb(simulation: Simulation, disturbances: Sequence[str]) -> None:
     """Schedule disturbances: ``push:0,30,0@1.5`` [N], ``cup:0.4,0.1,0.2@3`` [m], ``cup:gone@3``, each at its time [s].
 
-    Raises
-    ------
-    SpecificationError
-        A text of another form, or an object that is not there.
+    Raises `SpecificationError`: a text of another form, or an object that is not there.
     """
     for text in disturbances:
         rest, _, seconds = text.rpartition("@")

@@ -15,7 +15,7 @@ from kineme.errors import SpecificationError
 from kineme.library.grounding import learned_movement
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import Channels, learned_names
-from kineme.validation import Array, as_numbers, check_number
+from kineme.validation import Array, as_point, check_number
 
 _GRIPPERS = ("grip", "grasp", "finger")
 
@@ -24,18 +24,8 @@ _GRIPPERS = ("grip", "grasp", "finger")
 class Skill:
     """What was shown of a symbol, in the coordinates that are places: positions or, without any, all that move.
 
-    Attributes
-    ----------
-    name, id, description : str
-    movements : ndarray of shape (n,)
-        Ids of its movements in the library.
-    starts, goals : ndarray of shape (n, k)
-    durations : ndarray of shape (n,)
-        [s].
-    axes : tuple of k str
-        Names of the coordinates.
-    units : tuple of k str or None
-        Their units, None where the recordings do not say it.
+    - `movements` (n,): their ids in the library. `starts`, `goals` (n, k). `durations` (n,) [s].
+    - `axes`, `units`: names of the k coordinates and their units, None where the recordings do not say it.
     """
 
     name: str
@@ -80,10 +70,7 @@ class Excess(NamedTuple):
 def skill_of(library: ActionLibrary, who: str) -> Skill:
     """Return what was shown of a symbol.
 
-    Raises
-    ------
-    SpecificationError
-        No such symbol, or one without movements.
+    Raises `SpecificationError`: no such symbol, or one without movements.
     """
     symbol = library[who]
     if not len(symbol):
@@ -121,16 +108,11 @@ def is_gripper(name: str) -> bool:
 def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0) -> list[Excess]:
     """List what lies outside the box of starts, goals and displacements that were shown; empty if nothing does.
 
-    Parameters
-    ----------
-    skill : Skill
-    start, goal : array_like of shape (k,)
-        Places, in the unit of the recordings.
-    margin : float, default 0.0
-        By which the boxes are larger on every side, in that unit.
+    Start and goal (k,) are places in the unit of the recordings. The boxes are larger by `margin` on every side, in
+    that unit.
     """
     check_number("margin", margin, least=0.0)
-    begin, end = (_place(skill, place, what) for place, what in ((start, "start"), (goal, "goal")))
+    begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
     excesses = []
     for (what, shown), value in zip(skill.shown.items(), (begin, end, end - begin), strict=True):
         low, high = shown.min(axis=0) - margin, shown.max(axis=0) + margin
@@ -144,12 +126,12 @@ def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0
 
 def nearest_demonstration(skill: Skill, start: ArrayLike, goal: ArrayLike) -> int:
     """Return the row of the movement that went most nearly so: by displacement and, if equal, by start."""
-    begin, end = _place(skill, start, "start"), _place(skill, goal, "goal")
+    begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
     ways = np.linalg.norm(skill.goals - skill.starts - (end - begin), axis=1)
     return int(np.lexsort((np.linalg.norm(skill.starts - begin, axis=1), ways.round(9)))[0])
 
 
-def move_to(  # noqa: PLR0913 - one parameter per option
+def move_to(
     library: ActionLibrary,
     skill: Skill,
     start: ArrayLike,
@@ -157,12 +139,11 @@ def move_to(  # noqa: PLR0913 - one parameter per option
     *,
     duration: float | None = None,
     rate: float = 100.0,
-    standing: bool = True,
 ) -> Rollout | PoseRollout:
-    """Generate the movement of the nearest demonstration from a start to a goal.
+    """Generate the movement of the nearest demonstration from a start to a goal, at rest at both and exactly there.
 
-    Orientations and discrete channels are those of that demonstration. `standing`: it begins and ends at rest, exactly
-    at the goal. The places are not compared with what was shown: see `outside`.
+    Orientations and discrete channels are those of that demonstration. The places are not compared with what was shown:
+    see `outside`.
     """
     row = nearest_demonstration(skill, start, goal)
     learned = learned_movement(library.store, int(skill.movements[row]))
@@ -170,22 +151,7 @@ def move_to(  # noqa: PLR0913 - one parameter per option
     channels = primitive.to_recording.moving if primitive.to_recording is not None else None
     names = skill.axes if channels is None else learned.moving_columns
     columns = [names.index(axis) for axis in skill.axes]
-    ends = []
-    for shown, place in (
-        (primitive.starts[0], _place(skill, start, "start")),
-        (primitive.goals[0], _place(skill, goal, "goal")),
-    ):
-        point = shown.copy()
-        point[columns] = place
-        ends.append(point)
-    rest = np.zeros(primitive.n_dims) if standing else None
-    return primitive.rollout(ends[0], ends[1], duration, velocity=rest, end_velocity=rest, rate=rate)
-
-
-def _place(skill: Skill, place: ArrayLike, what: str) -> Array:
-    values = as_numbers(place, what)
-    if values.shape != (len(skill.axes),) or not np.isfinite(values).all():
-        raise SpecificationError(
-            f"expected {what} as {len(skill.axes)} finite numbers, {', '.join(skill.axes)}, got {values.tolist()}"
-        )
-    return values
+    first, last = primitive.starts[0].copy(), primitive.goals[0].copy()
+    first[columns], last[columns] = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
+    rest = np.zeros(primitive.n_dims)
+    return primitive.rollout(first, last, duration, velocity=rest, end_velocity=rest, rate=rate)

@@ -23,7 +23,7 @@ from kineme.reporting.text import first_names, printable
 from kineme.robots.models.robot import Robot, check_start
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.sampling import evenly_spaced
-from kineme.validation import Array, as_numbers
+from kineme.validation import as_point
 
 PATIENCE = 600.0  # seconds after which an approval comes too late: the arm may stand elsewhere
 _PATH_POINTS = 21  # of a path in an answer
@@ -76,18 +76,11 @@ class Question(NamedTuple):
 class SkillTools:
     """The tools over the skills of a library, as plain data; `skills_server` serves them.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-        Nothing in it is changed. Changes by others are visible at the next call.
-    robot : Robot
-    execute : callable, optional
-        Executes a movement that was approved, ``execute(name, movement)``, and returns a sentence that says what was
-        done. Without it no tool exists that moves anything.
-    joints : array_like of shape (n,), optional
-        Where the joints stand at first; by default the rest posture. Then where the last movement has ended.
-    symbols : sequence of str, optional
-        Names or ids of the symbols that are offered; by default all that have movements.
+    - `library`: nothing in it is changed. Changes by others are visible at the next call.
+    - `execute`: executes a movement that was approved, ``execute(name, movement)``, and returns a sentence that says
+      what was done. Without it no tool exists that moves anything.
+    - `joints` (n,): where they stand at first, by default in the rest posture; then where the last movement has ended.
+    - `symbols`: names or ids of the symbols that are offered; by default all that have movements.
     """
 
     def __init__(
@@ -95,9 +88,7 @@ class SkillTools:
         symbols: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.library, self.robot, self.execute = library, robot, execute
-        self.joints: Array = robot.rest if joints is None else as_numbers(joints, "joints")
-        if self.joints.shape != (robot.n_joints,):
-            raise SpecificationError(f"expected joints as {robot.n_joints} numbers, got shape {self.joints.shape}")
+        self.joints = robot.rest if joints is None else as_point("joints", joints, robot.joints)
         check_start(robot, self.joints)
         self._offered = {library[who].id for who in symbols}
         self._question: Question | None = None  # the last one, until it is answered
@@ -119,10 +110,8 @@ class SkillTools:
     def call(self, tool: str, arguments: dict[str, Any]) -> Answer | Question:
         """Answer a call; a call to move is answered by the question to the person, and nothing moves before `decide`.
 
-        Raises
-        ------
-        SpecificationError
-            No such tool, or arguments that its schema does not allow; ranges aside, which the answer speaks of.
+        Raises `SpecificationError`: no such tool, or arguments that its schema does not allow; ranges aside, which the
+        answer speaks of.
         """
         tools = self.tools()
         if tool not in tools:
@@ -155,10 +144,8 @@ class SkillTools:
     def decide(self, token: str, tool: str, arguments: dict[str, Any], decision: str) -> Answer:
         """Execute the movement of the last question if the `decision` is "accept"; a question is answered once.
 
-        Raises
-        ------
-        SpecificationError
-            The token or the call is not that of the last question, that one is too old, or the library has changed.
+        Raises `SpecificationError`: the token or the call is not that of the last question, that one is too old, or the
+        library has changed.
         """
         question, self._question = self._question, None
         if (
@@ -289,10 +276,7 @@ def skills_server(tools: SkillTools) -> Any:
     where the client cannot ask, or the answer is anything but yes, nothing moves. An approval holds once, for the
     movement that was shown.
 
-    Raises
-    ------
-    DataError
-        The extra ``mcp`` is not installed.
+    Raises `DataError`: the extra ``mcp`` is not installed.
     """
     with needs("mcp", "serve skills", "mcp"):
         import anyio

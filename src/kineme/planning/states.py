@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -41,19 +41,10 @@ State = Mapping[str, Any]
 class States:
     """States before and after n movements, in c columns.
 
-    Attributes
-    ----------
-    movements : ndarray of shape (n,)
-        Ids in the library.
-    symbols : tuple of n str
-    axes : tuple of k str
-        Coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are where the
-        hand is.
-    columns : tuple of c str
-    before, after : ndarray of shape (n, c)
-        NaN is not known; of columns of words, the number of the word.
-    words : mapping of str to tuple of str
-        Words of the columns that have some.
+    - `movements` (n,): ids in the library. `symbols`: the symbol of each.
+    - `axes`: k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are
+      where the hand is.
+    - `before`, `after` (n, c): NaN is not known; a word is its number in `words` of its column.
     """
 
     movements: NDArray[np.int64]
@@ -74,22 +65,14 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     Where the hand is, and discrete channels as of a gripper, come from the recordings. The table adds what else is
     known: positions of objects (``cup_x, cup_y, cup_z``, in the frame and unit of the recordings), flags and words.
 
-    Parameters
-    ----------
-    library : ActionLibrary
-    table : str, Path, or mapping of column to n values (as a data frame), optional
-        A file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, with a row for
-        each moment. Either with the columns ``movement`` (id, or file) and ``moment`` (before or after); or with
-        ``time``, in the clock of the recordings, and ``file`` where there are several: the state before is the last row
-        up to a movement's start, the one after the first row from its end on, each within a twentieth of its duration.
-        Empty cells are not known.
+    It is a file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, or a mapping of
+    column to n values, as a data frame; with a row for each moment. Either it has the columns ``movement`` (id, or
+    file) and ``moment`` (before or after); or ``time``, in the clock of the recordings, and ``file`` where there are
+    several: the state before is the last row up to a movement's start, the one after the first row from its end on,
+    each within a twentieth of its duration. Empty cells are not known.
 
-    Raises
-    ------
-    DataError
-        A file that is no table, or rows that belong to no movement.
-    SpecificationError
-        No symbol has movements.
+    Raises `DataError`: a file that is no table, or rows that belong to no movement. Raises `SpecificationError`: no
+    symbol has movements.
     """
     ids = np.concatenate([symbol.members for symbol in library.symbols()] or [np.empty(0, np.int64)])
     if not len(ids):
@@ -118,7 +101,13 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
         more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
-        _check_units(cells, dict(zip(axes, units, strict=True)))
+        unit_of = dict(zip(axes, units, strict=True))
+        for head in cells:
+            unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
+            if unit is not None and other is not None and unit != other:
+                raise DataError(
+                    f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
+                )
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
     return States(ids, symbols, axes, tuple(columns), before, after, words)
@@ -211,16 +200,6 @@ def _column(head: str) -> str:
     return f"{HAND}_{axis}" if stem.lower() in _HANDS else f"{stem}_{axis}" if stem else axis
 
 
-def _check_units(heads: Iterable[str], unit_of: Mapping[str, str | None]) -> None:
-    """Refuse a position in another unit than that of its axis in the recordings, where both are said."""
-    for head in heads:
-        unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
-        if unit is not None and other is not None and unit != other:
-            raise DataError(
-                f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
-            )
-
-
 def _matched(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
 ) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
@@ -261,9 +240,8 @@ def _rows_by_moment(
     who, moment, _ = heads
     index = {str(key): row for row, key in enumerate(ids.tolist())}
     for row, record in enumerate(read.records(library.store, ids)):
-        for name in {record["name"] or "", PurePath(record["name"] or "").name, PurePath(record["name"] or "").stem} - {
-            ""
-        }:
+        path = PurePath(record["name"] or "")
+        for name in {record["name"] or "", path.name, path.stem} - {""}:
             index[name] = -2 if name in index and index[name] != row else row
     before, after = np.full((2, len(ids)), -1)
     for k, (name, when) in enumerate(zip(cells[who], cells[moment], strict=True)):

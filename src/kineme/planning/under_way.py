@@ -20,10 +20,11 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory, between, n
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.robot_movement import RobotMovement
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array, as_point
 
 HAND_AT = "hand-at"
 _RATE = 100.0  # samples per second
+_STOPPED = 0.01  # of the movements like those shown, all the same
 _TRIED = 32  # lengths of an overlap
 _IN_A_ROW = 2  # looks that miss an object, before it counts: one may be an error of a sensor
 _AXES = "xyz"
@@ -53,28 +54,23 @@ class Frame(NamedTuple):
 
 def frame_of(plan: Plan, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
     """Return the frame of a plan whose axes are x, y, z, or two of them: then `origin` says where their plane lies."""
-    axes, where = plan.problem.domain.vocabulary.axes, as_numbers(origin, "origin")
+    axes = plan.problem.domain.vocabulary.axes
     if [*axes] != [axis for axis in _AXES if axis in axes] or len(axes) < 2:
         raise SpecificationError(f"expected a plan in coordinates x, y, z or two of them, got {', '.join(axes)}")
-    if where.shape != (3,) or not np.isfinite(where).all():
-        raise SpecificationError(f"expected origin as three finite numbers, got {origin!r:.80}")
-    return Frame([_AXES.index(axis) for axis in axes], where)
+    return Frame([_AXES.index(axis) for axis in axes], as_point("origin", origin, _AXES))
 
 
-def monitored(
-    library: ActionLibrary, robot: Robot, frame: Frame, error_rate: float = 0.01
-) -> Callable[[Step, RobotMovement], Watcher]:
+def monitored(library: ActionLibrary, robot: Robot, frame: Frame) -> Callable[[Step, RobotMovement], Watcher]:
     """Return what stops a step where it leaves what was shown of its symbol: `ActionLibrary.monitor`.
 
-    `error_rate` is the share of movements like those shown that are stopped all the same. Movements of more
-    than places, as with orientations, are not watched so: of these the tip does not tell enough.
+    Movements of more than places, as with orientations, are not watched so: of these the tip does not tell enough.
     """
 
     def watcher(step: Step, movement: RobotMovement) -> Watcher:
         if library.primitives(ids=library[step.operator].members[:1]).n_dims != len(frame.axes):
             return lambda t, tip: None
         ends = kinematics(robot, movement.trajectory.positions[[movement.first, -1]])[0]
-        monitor = library.monitor(step.operator, *map(frame.from_robot, ends), error_rate=error_rate)
+        monitor = library.monitor(step.operator, *map(frame.from_robot, ends), error_rate=_STOPPED)
 
         def watch(t: float, tip: Array) -> str | None:
             state = monitor.update(t, frame.from_robot(tip))

@@ -14,6 +14,7 @@ Other places are positions, as those where a hand or an item came to rest.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -55,26 +56,13 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """Objects and predicates of a set of states, and how near is near.
+    """Objects and predicates of a set of states, and how near is near."""
 
-    Attributes
-    ----------
-    axes : tuple of k str
-        Coordinates of places.
-    variables : tuple of Variable
-    radius : float
-        In the unit of the recordings: what lies within it is at a place.
-    closed_above : bool or None
-        Whether the gripper is closed above its threshold; None where no movement tells.
-    left_out : mapping of str to str
-        Columns that say nothing here -> why.
-    """
-
-    axes: tuple[str, ...]
+    axes: tuple[str, ...]  # coordinates of places
     variables: tuple[Variable, ...]
-    radius: float
-    closed_above: bool | None
-    left_out: Mapping[str, str]
+    radius: float  # in the unit of the recordings: what lies within it is at a place
+    closed_above: bool | None  # whether the gripper is closed above its threshold; None where no movement tells
+    left_out: Mapping[str, str]  # columns that say nothing here -> why
 
     def of_kind(self, *kinds: str) -> list[Variable]:
         """Return the variables of some kinds, in order."""
@@ -99,11 +87,7 @@ class Vocabulary:
 def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
     """Return the vocabulary of a set of states.
 
-    Parameters
-    ----------
-    states : States
-    radius : float, optional
-        Of places; by default where distances of the hand from the nearest object part into near and far.
+    The radius of places is by default where distances of the hand from the nearest object part into near and far.
     """
     columns = {name: k for k, name in enumerate(states.columns)}
     stems = [name.removesuffix(f"_{states.axes[0]}") for name in columns if name.endswith(f"_{states.axes[0]}")]
@@ -252,9 +236,9 @@ def position_of(names: Sequence[str], state: State) -> Array:
 
 def _as_number(value: Any) -> float:
     try:
-        return float("nan") if value is None else float(value)
+        return math.nan if value is None else float(value)
     except (TypeError, ValueError):
-        return float("nan")
+        return math.nan
 
 
 def hand_of(vocabulary: Vocabulary, state: State) -> Array:
@@ -294,22 +278,15 @@ def places_of(
     return places
 
 
-def _is_closed(vocabulary: Vocabulary, state: State) -> bool | None:
-    gripper = next(iter(vocabulary.of_kind("gripper")), None)
-    if gripper is None or vocabulary.closed_above is None:
-        return None
-    value = _as_number(state.get(gripper.columns[0]))
-    return None if np.isnan(value) else (value > gripper.threshold) == vocabulary.closed_above
-
-
 def _held(vocabulary: Vocabulary, state: State) -> dict[str, bool | None]:
     """Tell of each item whether it is held: the nearest one, by a closed gripper; None where that is not known."""
     items = vocabulary.of_kind("item")
     if not vocabulary.tells_grasp:
         return {item.name: False for item in items}
-    closed = _is_closed(vocabulary, state)
-    if closed is not True:
-        return {item.name: closed for item in items}
+    gripper = next(iter(vocabulary.of_kind("gripper")), None)
+    value = math.nan if gripper is None else _as_number(state.get(gripper.columns[0]))
+    if gripper is None or (value > gripper.threshold) != vocabulary.closed_above or np.isnan(value):
+        return dict.fromkeys((item.name for item in items), None if np.isnan(value) else False)
     hand = hand_of(vocabulary, state)
     away = {item.name: float(np.linalg.norm(position_of(item.columns, state) - hand)) for item in items}
     near = {name: distance for name, distance in away.items() if distance <= vocabulary.radius}
@@ -363,20 +340,18 @@ def _facts_of_items(vocabulary: Vocabulary, state: State, places: Mapping[str, A
 
 
 def _predicates(variable: Variable) -> list[str]:
-    """List the predicates that a column tells."""
     if variable.kind == "word":
         return [f"{variable.name}-{word}" for word in variable.words]
     return [variable.name]
 
 
 def _flags(vocabulary: Vocabulary, variable: Variable, state: State) -> dict[Fact, bool]:
-    """Return the facts that one flag or word tells."""
     arguments = (variable.owner,) if variable.owner else ()
     value = state.get(variable.columns[0])
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return {}
     if variable.kind == "word" or (variable.kind == "flag" and variable.words):
-        word = _word(variable, value)
+        word = value if isinstance(value, str) else f"{value:g}"
         if variable.kind == "word":
             return {(f"{variable.name}-{name}", *arguments): name == word for name in variable.words}
         return {(variable.name, *arguments): word == variable.words[1]} if word in variable.words else {}
@@ -384,10 +359,6 @@ def _flags(vocabulary: Vocabulary, variable: Variable, state: State) -> dict[Fac
         return {}  # it is said by holding and hand-empty
     number = _as_number(value)
     return {} if np.isnan(number) else {(variable.name, *arguments): bool(number > variable.threshold)}
-
-
-def _word(variable: Variable, value: Any) -> str:
-    return str(value) if isinstance(value, str) else f"{value:g}"
 
 
 def predicates_of(vocabulary: Vocabulary) -> dict[str, tuple[str, ...]]:

@@ -74,7 +74,7 @@ def to_text(table: Table, width: int | None = None) -> str:
 
 def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
     """Widths that sum up to `width` at most, widest columns narrowed first; None where columns would get too narrow."""
-    words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
+    words = [max((width_of(word) for row in lines for word in row[k].split()), default=0) for k in range(len(natural))]
     for least in (words, [min(word, _NARROW) for word in words]):
         if sum(least) <= width:
             limit = next(
@@ -160,11 +160,6 @@ def wrapped(text: str, width: int) -> list[str]:
         else:
             lines.append(word)
     return lines or [""]
-
-
-def widest_word(text: str) -> int:
-    """Columns of the widest word."""
-    return max(map(width_of, text.split()), default=0)
 
 
 def _beginning(text: str, width: int) -> str:

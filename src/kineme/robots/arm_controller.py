@@ -15,15 +15,9 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.rotations import matrices_of, matrix_one
 from kineme.robots.execution.joint_trajectory import Torques
 from kineme.robots.execution.preflight import TRACKED, TURNED
-from kineme.robots.kinematics.descent import (
-    POSTURE_COST,
-    InverseKinematics,
-    is_partial,
-    point_in_words,
-    reaching_postures,
-)
+from kineme.robots.kinematics import descent
 from kineme.robots.models.robot import Robot, check_robot
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array, as_numbers, as_point
 
 _AT = 1 - 1e-9  # share of a limit from which it counts as met
 
@@ -66,22 +60,13 @@ MESSAGES = {
 class ArmState(NamedTuple):
     """An arm after one step of live control.
 
-    Attributes
-    ----------
-    joints : ndarray of shape (n,)
-        What to send now [rad, m].
-    velocities : ndarray of shape (n,)
-        Of the joints during this step, per second: constant in it.
-    accelerations : ndarray of shape (n,)
-        Change of the velocities since the last step, per second squared.
-    torques : ndarray of shape (n,)
-        What that takes by the model [Nm, N], without friction and load; nan where it knows no masses.
-    distance : float
-        Of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
-    status : ArmStatus
-        Whether the arm follows, and which limits hold it back.
-    movement : State
-        Of the movement; see `kineme.control.State`.
+    - `joints` (n,): what to send now [rad, m].
+    - `velocities` (n,): of the joints during this step, per second: constant in it.
+    - `accelerations` (n,): change of the velocities since the last step, per second squared.
+    - `torques` (n,): what that takes by the model [Nm, N], without friction and load; nan where it knows no masses.
+    - `distance`: of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
+    - `status`: whether the arm follows, and which limits hold it back.
+    - `movement`: of the movement; see `kineme.control.State`.
     """
 
     joints: Array
@@ -160,9 +145,7 @@ class ArmController:
                 raise TrajectoryError(f"expected orientation as one quaternion (w, x, y, z), got shape {q.shape}")
             self._rotation = matrices_of(q)
         controller.reset()
-        self._start = self._nearest_start() if start is None else as_numbers(start, "start")
-        if self._start.shape != (robot.n_joints,):
-            raise SpecificationError(f"expected start as {robot.n_joints} joints, got shape {self._start.shape}")
+        self._start = self._nearest_start() if start is None else as_point("start", start, robot.joints)
         self._waits = controller.options.feedback == "phase"
         self.reset()
 
@@ -213,13 +196,13 @@ class ArmController:
 
     def _nearest_start(self) -> Array:
         position, rotation = self._pose(self.controller.state)
-        what = f"the start of the movement, {point_in_words(position)} m"
-        postures = reaching_postures(self.robot, position, rotation, self._ik.costs, what)
+        what = f"the start of the movement, {descent.point_in_words(position)} m"
+        postures = descent.reaching_postures(self.robot, position, rotation, self._ik.costs, what)
         away = np.abs(postures - self.robot.rest).max(axis=1)
         return np.asarray(postures[int(np.argmin(away))])
 
 
-class LiveKinematics(InverseKinematics):
+class LiveKinematics(descent.InverseKinematics):
     """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
 
     A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
@@ -233,7 +216,7 @@ class LiveKinematics(InverseKinematics):
         super().__init__(robot, orientation)
         self._weights = np.concatenate((np.ones(3), self.costs))
         self._still = np.zeros(robot.n_joints)
-        self._turns = np.zeros(3) if is_partial(robot) else self.costs
+        self._turns = np.zeros(3) if descent.is_partial(robot) else self.costs
 
     def reset(self, q: Array) -> None:
         """Start from joint positions q (n,), at rest; the pose to follow is that of the tip."""
@@ -291,14 +274,14 @@ class LiveKinematics(InverseKinematics):
         distance = math.hypot(*gap)
         J = self._weights[:, None] * self._configuration.get_frame_jacobian(self.robot.tip)
         curvature = J.T @ J
-        curvature.flat[:: len(q) + 1] += _CURVED * distance * distance / (distance + _NEAR) + POSTURE_COST**2
+        curvature.flat[:: len(q) + 1] += _CURVED * distance * distance / (distance + _NEAR) + descent.POSTURE_COST**2
         to_rest = self.robot.rest - q
         closing = np.linalg.solve(curvature, J.T @ gap) if distance > _CLOSED else self._still
         share, share_to_rest = self._shares(np.array((closing, to_rest)))
         moved = back @ (share * away + _bounded(wanted.translation - last.translation))
         turned = pinocchio.log3(pinocchio.exp3(share * turn) @ (last.rotation.T @ wanted.rotation))
         way = self._weights * np.concatenate((moved, turned))
-        return curvature, J.T @ way + POSTURE_COST**2 * share_to_rest * to_rest
+        return curvature, J.T @ way + descent.POSTURE_COST**2 * share_to_rest * to_rest
 
     def _within(self, allowed: Range, curvature: Array, slope: Array) -> Array | None:
         """The change of the joints (n,) that a step asks for, within a range of velocities."""

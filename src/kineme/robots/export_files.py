@@ -49,10 +49,7 @@ def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC)
     One JointTrajectory on `topic` at time 0, and a JointState for each sample on /joint_states. The definitions of both
     types in the bag begin with a comment that says the units.
 
-    Raises
-    ------
-    DataError
-        Another ending, the extra ``ros`` is not installed, or a file that cannot be written.
+    Raises `DataError`: another ending, the extra ``ros`` is not installed, or a file that cannot be written.
     """
     try:
         from rosbags import rosbag1, rosbag2
@@ -167,10 +164,7 @@ def write_joints(path: str | Path, trajectory: JointTrajectory) -> Path:
 
     The heads of joints end in their units: ``shoulder_pan [rad]``, ``v_shoulder_pan [rad/s]``.
 
-    Raises
-    ------
-    DataError
-        An ending that no writer has, or a file that cannot be written.
+    Raises `DataError`: an ending that no writer has, or a file that cannot be written.
     """
     return write_movement(Path(path), *as_columns(trajectory))
 

@@ -17,7 +17,7 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory, Torques, b
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.robots.planning.robot_movement import InfeasibleError, RobotMovement
-from kineme.validation import Array, as_numbers, check_number
+from kineme.validation import Array, as_numbers, as_point, check_number
 
 _STEP = 0.001  # [s]
 _LOOKS = 10  # steps from one look of `watch`, and one sample of a `Run`, to the next
@@ -38,24 +38,14 @@ Watch = Callable[[float, Array], bool]
 class Run:
     """A movement as the simulated arm made it, T samples, 100 of them in a second.
 
-    Attributes
-    ----------
-    times : ndarray of shape (T,)
-        Since the movement began [s], below 0 in the approach; at its end the arm stands for 0.2 s at least.
-    joints : ndarray of shape (T, n)
-        As measured [rad, m].
-    sent : ndarray of shape (T, n)
-        Where they were sent.
-    tips : ndarray of shape (T, 3)
-        As measured [m].
-    objects : dict of str to ndarray of shape (T, 3)
-        Where each object was [m]; nan where it was gone.
-    stopped : float or None
-        When `watch` stopped the arm [s]; None where it came to the end.
-    tip_error, joint_error : float
-        Largest distance from what was sent, of the tip [m] and of any joint [rad, m].
-    effort : float
-        Largest torque of any joint, as a share of its limit; nan where none is known.
+    - `times` (T,): since the movement began [s], below 0 in the approach; at its end the arm stands for 0.2 s at least.
+    - `joints` (T, n): as measured [rad, m].
+    - `sent` (T, n): where they were sent.
+    - `tips` (T, 3): as measured [m].
+    - `objects`: name -> where it was (T, 3) [m]; nan where it was gone.
+    - `stopped`: when `watch` stopped the arm [s]; None where it came to the end.
+    - `tip_error`, `joint_error`: largest distance from what was sent, of the tip [m] and of any joint [rad, m].
+    - `effort`: largest torque of any joint, as a share of its limit; nan where none is known.
     """
 
     times: Array
@@ -142,7 +132,7 @@ class Simulation:
         self._values = as_numbers(opening, "opening")
         if self._values.shape != (2,) or not np.isfinite(self._values).all() or self._values[0] == self._values[1]:
             raise SpecificationError(f"expected opening as two numbers, open and closed, got {opening!r:.80}")
-        places = {name: _three(place, name) for name, place in (objects or {}).items()}
+        places = {name: as_point(name, place, "xyz") for name, place in (objects or {}).items()}
         self.flags, self._random = dict(flags or {}), np.random.default_rng(seed)
         self._row = {name: row for row, name in enumerate(places)}
         columns = [*_columns("tip"), gripper, *(c for name in places for c in _columns(name)), *self.flags]
@@ -151,11 +141,8 @@ class Simulation:
                 f"expected objects, gripper and flags with columns of different names, got {columns}"
             )
         self._model, self._data, self._mujoco = _world(robot, len(places))
-        n = robot.n_joints
-        self.joints = np.array(robot.rest if start is None else as_numbers(start, "start"), dtype=float)
-        if self.joints.shape != (n,) or not np.isfinite(self.joints).all():
-            raise SpecificationError(f"expected start as {n} finite numbers, got {self.joints.tolist()}")
-        self._data.qpos[:n] = self.joints
+        self.joints = np.array(robot.rest if start is None else as_point("start", start, robot.joints))
+        self._data.qpos[: robot.n_joints] = self.joints
         self._tip = self._model.body("tip").id
         self._objects = self._tip + 1 + np.arange(len(places))
         self._most = np.where(np.isnan(robot.effort), np.inf, robot.effort)
@@ -191,7 +178,7 @@ class Simulation:
 
     def push(self, force: ArrayLike, at: float = 0.0, duration: float = 0.2) -> None:
         """Push the tip with a force (3,) [N], from `at` seconds from now on."""
-        newtons = _three(force, "force")
+        newtons = as_point("force", force, "xyz")
         check_number("duration", duration, above=0.0)
 
         def add(sign: float) -> None:
@@ -202,7 +189,7 @@ class Simulation:
 
     def place(self, name: str, position: ArrayLike, at: float = 0.0) -> None:
         """Move an object, `at` seconds from now; out of the gripper, if it is held, and back, if it was gone."""
-        row, place = self._row_of(name), _three(position, "position")
+        row, place = self._row_of(name), as_point("position", position, "xyz")
         self._schedule(at, lambda: self._put(row, place))
 
     def remove(self, name: str, at: float = 0.0) -> None:
@@ -398,15 +385,8 @@ def brake(robot: Robot, trajectory: JointTrajectory, at: float) -> JointTrajecto
 
     The path is passed slower and slower: with ``x = t / r``, ``ds/dt = 1 - 3 x^2 + 2 x^3``, so it is left nowhere, and
     what was checked of it holds. r is the least of a series of seconds, each 1.25 times the one before, with which the
-    limits hold; where the trajectory ends sooner than that, it is its remainder.
-
-    Parameters
-    ----------
-    robot : Robot
-    trajectory : JointTrajectory
-        One that passed its checks.
-    at : float
-        Time [s] of the trajectory at which the brake begins: time 0 of what is returned.
+    limits hold; where the trajectory ends sooner than that, it is its remainder. The trajectory has passed its checks,
+    and `at` [s] is its time at which the brake begins: time 0 of what is returned.
     """
     check_number("at", at, least=0.0, most=trajectory.duration)
     ramp, torques = _FIRST_RAMP, Torques(robot)
@@ -481,10 +461,3 @@ def _pose(placement: Any) -> dict[str, Array]:
 
 def _columns(name: str) -> list[str]:
     return [f"{name}_{axis}" for axis in "xyz"]
-
-
-def _three(values: ArrayLike, what: str) -> Array:
-    numbers = as_numbers(values, what)
-    if numbers.shape != (3,) or not np.isfinite(numbers).all():
-        raise SpecificationError(f"expected {what} as three finite numbers, got {values!r:.80}")
-    return numbers

@@ -57,21 +57,17 @@ def _in_child() -> None:
         renew()
     held.close()
     if sys.version_info < (3, 12):  # before 3.12, all instances share one lock per cached property
-        _renew_cached_properties()
-
-
-def _renew_cached_properties() -> None:
-    classes = {
-        value
-        for name, module in list(sys.modules.items())
-        if name.partition(".")[0] == "kineme"
-        for value in list(vars(module).values())
-        if isinstance(value, type)
-    }
-    for attribute in (
-        value for klass in classes for value in vars(klass).values() if isinstance(value, cached_property)
-    ):
-        vars(attribute)["lock"] = RLock()
+        classes = {
+            value
+            for name, module in list(sys.modules.items())
+            if name.partition(".")[0] == "kineme"
+            for value in list(vars(module).values())
+            if isinstance(value, type)
+        }
+        for attribute in (
+            value for klass in classes for value in vars(klass).values() if isinstance(value, cached_property)
+        ):
+            vars(attribute)["lock"] = RLock()
 
 
 if hasattr(os, "register_at_fork"):

@@ -99,14 +99,6 @@ class Rests:
     rests: float = 0.03  # and that is not moved where it ends
 
 
-def rests_of(library: ActionLibrary, rest: float = 0.3) -> Rests:
-    """Return the borders for movements such as those of a library, by medians over at most 200 of them."""
-    ids = library.ids()
-    movements = library.movements(ids=ids[evenly_spaced(len(ids), _MEASURED)])
-    size = float(np.median([np.ptp(movement.positions, axis=0).max() for movement in movements]))
-    return Rests(size, _LONGEST * float(movements.durations.max()) + rest, rest)
-
-
 class Summary:
     """Counts of what came and what was recognized, and seconds from each deciding sample to its symbol."""
 
@@ -146,8 +138,11 @@ class Listener:
         self._library, self._tell, self._choose = library, tell, choose
         self.summary = Summary()
         self._live, self._version = library.stream(), library.version
-        self.rests = rests_of(library, rest)
-        example = library.movements(ids=library.ids()[:1])[0]
+        ids = library.ids()
+        movements = library.movements(ids=ids[evenly_spaced(len(ids), _MEASURED)])
+        size = float(np.median([np.ptp(movement.positions, axis=0).max() for movement in movements]))
+        self.rests = Rests(size, _LONGEST * float(movements.durations.max()) + rest, rest)
+        example = movements[0]
         self._live.update(example.times, example.recorded)
         self._live.remember(self._live.finish())  # code is loaded now, not when the first movement ends
         self._live.reset(person=True)

@@ -291,16 +291,11 @@ def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
         "smooth": smoothness_factor(dmp),
     }
     if header["encodes"]:
-        arrays |= _encoder(dmp)
+        response = decoder(dmp, dmp.n_points)
+        response = response._replace(goal=np.zeros_like(response.goal))
+        weights, velocity = trajectory_regression(response, dmp.K, dmp.ridge_strength)
+        arrays |= {"encoder": weights, "encoder velocity": velocity}
     return Snapshot({"movements": header}, arrays)
-
-
-def _encoder(dmp: DMP) -> dict[str, NDArray[Any]]:
-    response = decoder(dmp, dmp.n_points)
-    weights, velocity = trajectory_regression(
-        response._replace(goal=np.zeros_like(response.goal)), dmp.K, dmp.ridge_strength
-    )
-    return {"encoder": weights, "encoder velocity": velocity}
 
 
 def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | None:

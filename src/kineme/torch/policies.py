@@ -99,10 +99,7 @@ class ActionChunk(torch.nn.Module):
 
         They belong to chunks that begin with the demonstrated velocity, ``primitive.initial_velocity(actions)``.
 
-        Raises
-        ------
-        TrajectoryError
-            Actions of another shape.
+        Raises `TrajectoryError`: actions of another shape.
         """
         weights, goal = self.primitive.encode(actions)
         numbers = torch.cat((weights, (goal - actions[..., 0, :])[..., None]), dim=-1)
@@ -139,10 +136,7 @@ class Trajectories:
     def set_params(self, params: Any) -> None:
         """Set weights and goal, (..., d (N + 1)), a tensor or an array.
 
-        Raises
-        ------
-        TrajectoryError
-            Another number of them.
+        Raises `TrajectoryError`: another number of them.
         """
         self._params = self._tensor(params)
         expected = self._given.dims * (self._given.dmp.n_basis + 1)

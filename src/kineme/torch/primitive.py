@@ -202,10 +202,7 @@ class Primitive(torch.nn.Module):
 
         Weights mean the same: learned at 50 Hz, they move at 1 kHz. Learned durations are replaced by the given one.
 
-        Raises
-        ------
-        SpecificationError
-            A rate too low to follow the dynamics; a duration of 0 or less.
+        Raises `SpecificationError`: a rate too low to follow the dynamics; a duration of 0 or less.
         """
         if duration is not None:
             check_number("duration", duration, above=0.0)
@@ -305,6 +302,7 @@ class Primitive(torch.nn.Module):
 
         Position and velocity are continuous there. The samples are those of `forward`, so that
         ``torch.where(times[:, None] < at, path, again)`` joins the two; those before `at` are `position`, at rest.
+        Errors are those of `forward`.
 
         Parameters
         ----------
@@ -316,11 +314,6 @@ class Primitive(torch.nn.Module):
         start : Tensor of shape (..., d), optional
             x0 of the whole movement, from which its shape counts: with it, and all else unchanged, the movement goes on
             as planned. By default the learned one, or else `position`.
-
-        Raises
-        ------
-        TrajectoryError, SpecificationError
-            As in `forward`.
         """
         position = self._vector("position", position)
         origin = position if start is None and self.start is None else start
@@ -344,12 +337,8 @@ class Primitive(torch.nn.Module):
         One matrix product, the fit of `kineme.DMP.learn`. Together with their first sample and `initial_velocity` they
         are what the movements are repeated from.
 
-        Raises
-        ------
-        TrajectoryError
-            Another number of samples or dimensions.
-        SpecificationError
-            A specification with preprocessing steps, which work on recordings.
+        Raises `TrajectoryError`: another number of samples or dimensions. Raises `SpecificationError`: a specification
+        with preprocessing steps, which work on recordings.
         """
         relative, goal = self._relative(positions)
         weights, distance = relative @ self.encode_matrix, self._distance(relative[..., -1])
@@ -374,6 +363,8 @@ class Primitive(torch.nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Mean (..., T, d) and covariances of the positions, for weights with a Gaussian distribution.
 
+        Errors are those of `forward`.
+
         Parameters
         ----------
         mean : Tensor of shape (..., d, N)
@@ -384,11 +375,6 @@ class Primitive(torch.nn.Module):
         joint : bool, default False
             Covariances of all samples with each other, (..., T, d, T, d), which takes T times the memory of those of
             each sample (..., T, d, d).
-
-        Raises
-        ------
-        TrajectoryError, SpecificationError
-            As in `forward`.
         """
         path = self(mean, start, goal, velocity=velocity, duration=duration)
         decode = self.decode_matrix[0, : self.dmp.n_basis].mT
@@ -415,6 +401,7 @@ class Primitive(torch.nn.Module):
 
         It is that of all T d numbers together, with covariance ``A L L' A' + noise^2 I``. Since paths that weights can
         make have but d N dimensions, only a matrix of that size is decomposed, whatever T: outside them is noise alone.
+        Errors are those of `encode` and `forward`, and noise that is not above 0.
 
         Parameters
         ----------
@@ -426,11 +413,6 @@ class Primitive(torch.nn.Module):
         noise : float, default 0.01
             Standard deviation of each number, in the unit of the positions; in single precision not much below a
             thousandth of the extent.
-
-        Raises
-        ------
-        TrajectoryError, SpecificationError
-            As in `encode` and `forward`; noise that is not above 0.
         """
         check_number("noise", noise, above=0.0)
         self._relative(positions)  # which checks them
@@ -462,17 +444,7 @@ class Primitive(torch.nn.Module):
     ) -> Tensor:
         """Draw `size` movements (size, ..., T, d) from that distribution, with gradients in mean and factor.
 
-        Parameters
-        ----------
-        size : int
-        mean, chol, start, goal, velocity, duration : as in `distribution`
-        generator : torch.Generator, optional
-            Source of the random numbers.
-
-        Raises
-        ------
-        TrajectoryError, SpecificationError
-            As in `forward`.
+        Parameters and errors are those of `distribution`; `generator` is the source of the random numbers.
         """
         chol = self._vector("chol", chol, self.dims * self.dmp.n_basis, self.dims * self.dmp.n_basis)
         batch = torch.broadcast_shapes(mean.shape[:-2], chol.shape[:-2])

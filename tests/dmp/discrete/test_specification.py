@@ -34,8 +34,8 @@ OUT_OF_RANGE = [
     ({"phase_end": 1.0}, "phase_end to be between 1e-100 and 0.999, got 1.0"),
     ({"phase_end": 1e-300}, "phase_end to be between 1e-100 and 0.999, got 1e-300"),
     ({"phase_end": "0.01"}, "phase_end to be a number above 0, got '0.01'"),
-    ({"overlap": 0.0}, "overlap to be a number above 0, got 0.0"),
-    ({"overlap": 1.0}, "overlap to be below 1, got 1.0"),
+    ({"overlap": 0.0}, "overlap to be a number above 0 and below 1, got 0.0"),
+    ({"overlap": 1.0}, "overlap to be a number above 0 and below 1, got 1.0"),
     ({"n_points": 9}, "n_points to be a whole number of at least 10, got 9"),
 ]
 

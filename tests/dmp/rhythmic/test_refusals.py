@@ -16,8 +16,8 @@ WAVE = Trajectory(T, np.sin(2 * np.pi * T), name="wave")
     ("parameters", "message"),
     [
         ({"n_basis": 2}, "expected n_basis to be a whole number of at least 3, got 2"),
-        ({"overlap": 1.0}, "expected overlap to be below 1, got 1.0"),
-        ({"overlap": 0}, "expected overlap to be a number above 0, got 0"),
+        ({"overlap": 1.0}, "expected overlap to be a number above 0 and below 1, got 1.0"),
+        ({"overlap": 0}, "expected overlap to be a number above 0 and below 1, got 0"),
         ({"stiffness": 0}, "expected stiffness to be a number above 0, got 0"),
         ({"damping": -1}, "expected damping to be a number above 0, got -1"),
         ({"period": 0.0}, "expected period to be a number above 0, got 0.0"),

@@ -156,9 +156,9 @@ def test_what_stays_begins_and_ends_at_rest(make_movement, seed, tolerance):
 @pytest.mark.parametrize(
     ("step", "message"),
     [
-        (lambda: TrimRest(-0.1), "tolerance to be a number of at least 0, got -0.1"),
-        (lambda: TrimRest(0.5), "tolerance to be below 0.5, got 0.5"),
-        (lambda: TrimRest("0.1"), "tolerance to be a number of at least 0, got '0.1'"),
+        (lambda: TrimRest(-0.1), "tolerance to be a number of at least 0 and below 0.5, got -0.1"),
+        (lambda: TrimRest(0.5), "tolerance to be a number of at least 0 and below 0.5, got 0.5"),
+        (lambda: TrimRest("0.1"), "tolerance to be a number of at least 0 and below 0.5, got '0.1'"),
         (lambda: Smooth(0), "cutoff to be a number above 0, got 0"),
         (lambda: Smooth(float("nan")), "cutoff to be a number above 0, got nan"),
         (lambda: Resample(3), "n_points to be a whole number of at least 4, got 3"),

@@ -78,20 +78,14 @@ REJECTED = reduce(or_, (member for member in Status if str(member.name).endswith
 class State(NamedTuple):
     """A movement at one moment. The arrays are the caller's own: the controller keeps no reference to them.
 
-    Attributes
-    ----------
-    time : float
-        Since the start [s].
-    progress : float
-        The phase as normalized time u: 0 at the start, 1 where the demonstration ended, more while settling; of a
-        rhythm the periods since the start.
-    position, velocity, acceleration : ndarray of shape (d,)
-        In the unit of the demonstration, per second and per second squared.
-    goal : ndarray of shape (d,)
-        The goal in force, of a rhythm the baseline; on the way to a new one where the controller filters goals.
-    via_missed : float
-        Largest distance from via points whose time passed in this step; 0 where none did. Of poses in positions.
-    status : Status
+    - `time`: since the start [s].
+    - `progress`: the phase as normalized time u: 0 at the start, 1 where the demonstration ended, more while settling;
+      of a rhythm the periods since the start.
+    - `position`, `velocity`, `acceleration` (d,): in the unit of the demonstration, per second and per second squared.
+    - `goal` (d,): the goal in force, of a rhythm the baseline; on the way to a new one where the controller filters
+      goals.
+    - `via_missed`: largest distance from via points whose time passed in this step; 0 where none did. Of poses in
+      positions.
     """
 
     time: float

@@ -146,23 +146,14 @@ class DMP(Specification):
 class Primitives(Batch):
     """n primitives of d dimensions that share one specification; made by `DMP.learn`.
 
-    Attributes
-    ----------
-    dmp : DMP
-        The specification.
-    scaled_weights : ndarray of shape (n, d, N)
-        Weights times the formulation's scale: ``(g - x0) w`` (original) or ``K w`` (bio-inspired). They
-        exist for every movement, closed ones too.
-    starts, goals : ndarray of shape (n, d)
-        x0 and g, in the user's unit.
-    velocities : ndarray of shape (n, d)
-        Initial velocities, in the user's unit per second.
-    durations : ndarray of shape (n,)
-        tau [s].
-    extents : ndarray of shape (n, d)
-        Largest minus smallest position of each demonstration; g counts as close to x0 relative to it.
-    labels : ndarray of shape (n,) or None
-    names : tuple of str or None
+    - `dmp`: the specification.
+    - `scaled_weights` (n, d, N): weights times the formulation's scale: ``(g - x0) w`` (original) or ``K w``
+      (bio-inspired). They exist for every movement, closed ones too.
+    - `starts`, `goals` (n, d): x0 and g, in the user's unit.
+    - `velocities` (n, d): initial velocities, in the user's unit per second.
+    - `durations` (n,): tau [s].
+    - `extents` (n, d): largest minus smallest position of each demonstration; g counts as close to x0 relative to it.
+    - `labels` (n,).
     """
 
     ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
@@ -191,10 +182,7 @@ class Primitives(Batch):
     def weights(self) -> Array:
         """Weights w of Eq. (2), shape (n, N, d).
 
-        Raises
-        ------
-        DegenerateMovementError
-            In the original formulation, where ``g = x0`` in a dimension.
+        Raises `DegenerateMovementError`: in the original formulation, where ``g = x0`` in a dimension.
         """
         return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
 
@@ -203,10 +191,7 @@ class Primitives(Batch):
 
         Contains s if the specification's gating is "phase"; never contains K or g - x0.
 
-        Raises
-        ------
-        DegenerateMovementError
-            In the original formulation, where ``g = x0`` in a dimension.
+        Raises `DegenerateMovementError`: in the original formulation, where ``g = x0`` in a dimension.
         """
         return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
 
@@ -315,10 +300,7 @@ class Primitives(Batch):
 
         They move so without being told; they are saved, recognized, controlled and moved to other goals like any other.
 
-        Raises
-        ------
-        SpecificationError
-            A rollout with a goal that moves, which a primitive has not.
+        Raises `SpecificationError`: a rollout with a goal that moves, which a primitive has not.
         """
         if movement.goal_velocities is not None and movement.goal_velocities.any():
             raise SpecificationError(

@@ -91,19 +91,12 @@ def check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None
 class BasisSelection(Generic[S]):
     """Result of `DMP.choose`.
 
-    Attributes
-    ----------
-    dmp : DMP
-        The specification with the number of basis functions and the ridge that were chosen.
-    n_basis : ndarray of shape (a,)
-        The numbers of basis functions that were tried.
-    ridge : ndarray of shape (b,)
-        The ridges that were tried.
-    errors : ndarray of shape (a, b)
-        Square root of the generalized cross-validation score: the error that is to be expected at samples that were
-        not fitted, their own noise included, as a share of a movement's largest extent.
-    degrees_of_freedom : ndarray of shape (a, b)
-        trace(H): how many numbers each dimension of a movement is fitted with.
+    - `dmp`: the specification with the number of basis functions and the ridge that were chosen.
+    - `n_basis` (a,): the numbers of basis functions that were tried.
+    - `ridge` (b,): the ridges that were tried.
+    - `errors` (a, b): square root of the generalized cross-validation score: the error that is to be expected at
+      samples that were not fitted, their own noise included, as a share of a movement's largest extent.
+    - `degrees_of_freedom` (a, b): trace(H): how many numbers each dimension of a movement is fitted with.
     """
 
     dmp: S

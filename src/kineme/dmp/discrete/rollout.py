@@ -150,10 +150,7 @@ class BaseRollout(Presented, ABC):
         would be: orientations in the recorded order, and discrete channels that step where they did. Of other poses the
         positions are the columns that are generated, quaternions (w, x, y, z) too.
 
-        Raises
-        ------
-        TrajectoryError
-            Movements that are none, as of fewer than four samples.
+        Raises `TrajectoryError`: movements that are none, as of fewer than four samples.
         """
         demonstrations = Demonstrations.from_arrays(
             self.positions, self.labels, list(self.times), self.names, copy=False

@@ -226,9 +226,7 @@ class GaussianBasis:
 
     def __post_init__(self) -> None:
         check_count("n_basis", self.n_basis, 2, most=MOST_BASIS)
-        check_number("overlap", self.overlap, above=0.0)
-        if self.overlap >= 1:
-            raise SpecificationError(f"expected overlap to be below 1, got {self.overlap!r}")
+        check_number("overlap", self.overlap, above=0.0, below=1.0)
         check_choice("gating", self.gating, GATINGS)
 
     @property

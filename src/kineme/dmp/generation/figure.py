@@ -108,7 +108,6 @@ def _draw_paths(figure: SubFigure, learned: Learned, lines: tuple[Array, Array],
 
 
 def _key(learned: Learned, has_path: bool, has_obstacles: bool) -> list[Any]:
-    """Entries of the legend."""
     from matplotlib.lines import Line2D
 
     off = largest_deviation(learned)

@@ -115,16 +115,11 @@ class PoseDMP:
 class PosePrimitives(Batch):
     """n primitives of orientations or poses; made by `PoseDMP.learn`.
 
-    Attributes
-    ----------
-    tangent : Primitives
-        Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
-        weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and angles
-        and k orientations it has p + 3 k.
-    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
-        The demonstrated goal orientations, where the rotation vectors are 0.
-    recorded_as : RecordedAs or None
-        Channels of the recordings, where they are known; see `channels`.
+    - `tangent`: of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before
+      it. Its weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and
+      angles and k orientations it has p + 3 k.
+    - `references` (n, 4): the demonstrated goal orientations, where the rotation vectors are 0.
+    - `recorded_as`: channels of the recordings, where they are known; see `channels`.
     """
 
     ROWS = Primitives.ROWS | {"references": "nq"}
@@ -287,10 +282,7 @@ class PosePrimitives(Batch):
     def from_rollout(cls, movement: PoseRollout) -> PosePrimitives:
         """The movements of a rollout as primitives of their own; see `Primitives.from_rollout`.
 
-        Raises
-        ------
-        SpecificationError
-            A rollout with a goal that moves, which a primitive has not.
+        Raises `SpecificationError`: a rollout with a goal that moves, which a primitive has not.
         """
         about, n = movement.recorded_as, len(movement)
         if about is not None and len(movement.tangent.primitives) < n:
@@ -322,10 +314,8 @@ class PosePrimitives(Batch):
         `Options` hold for linear and angular velocities and accelerations, as the state reports them; obstacles are
         points (m, 3) that the position steers around; `settle` holds for positions and rotation vectors [rad].
 
-        Raises
-        ------
-        SpecificationError, TrajectoryError
-            More than one primitive; an option out of its range; a start or goal that is no pose.
+        Raises `SpecificationError` or `TrajectoryError`: more than one primitive; an option out of its range; a start
+        or goal that is no pose.
         """
         if duration is not None:
             check_number("duration", duration, above=0.0)

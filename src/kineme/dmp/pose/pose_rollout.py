@@ -30,12 +30,8 @@ class PoseRollout(BaseRollout):
 
     A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`.
 
-    Attributes
-    ----------
-    tangent : Rollout
-        The movement in positions and rotation vectors.
-    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
-        Goal orientations, from which the rotation vectors count.
+    - `tangent`: the movement in positions and rotation vectors.
+    - `references` (n, 4): goal orientations, from which the rotation vectors count.
     """
 
     tangent: Rollout

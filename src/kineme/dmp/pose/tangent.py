@@ -23,18 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.recorded_as import primitive_columns
 from kineme.errors import TrajectoryError
+from kineme.movements import rotations
 from kineme.movements.channels.channel import is_plain, learned_names
 from kineme.movements.preparation.trim import Step, preprocess
-from kineme.movements.rotations import (
-    TINY,
-    angle_between,
-    as_vectors,
-    conjugate,
-    exp,
-    logarithm_factor,
-    normalized_rows,
-    product,
-)
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
@@ -152,9 +143,9 @@ def _rotation_vectors(demos: Demonstrations, columns: slice, start: int, stop: i
         i = int(np.searchsorted(offsets, row, side="right")) - 1
         return f"{describe(start + i, demos.names)}: sample {row - offsets[i]}"
 
-    q = normalized_rows(demos.positions[first:last, columns], where)
+    q = rotations.normalized_rows(demos.positions[first:last, columns], where)
     goals = q[offsets[1:] - 1]
-    relative = product(q, conjugate(np.repeat(goals, np.diff(offsets), axis=0)))
+    relative = rotations.product(q, rotations.conjugate(np.repeat(goals, np.diff(offsets), axis=0)))
     p = unwrapped(relative, offsets, where)
     p[offsets[1:] - 1] = 0.0  # but for rounding they are
     # Rounding is no movement, and no axis that the original formulation could divide by.
@@ -175,7 +166,9 @@ def from_tangent(tangent: Demonstrations, references: Array) -> Demonstrations:
     """
     n_vectors = 3 * (references.shape[1] // 4)
     vectors = tangent.positions[:, -n_vectors:].reshape(len(tangent.positions), -1, 3)
-    q = product(exp(vectors), np.repeat(references.reshape(len(references), -1, 4), tangent.lengths, axis=0))
+    q = rotations.product(
+        rotations.exp(vectors), np.repeat(references.reshape(len(references), -1, 4), tangent.lengths, axis=0)
+    )
     columns = np.concatenate((tangent.positions[:, :-n_vectors], q.reshape(len(q), -1)), axis=1)
     return _with_positions(tangent, columns)
 
@@ -210,10 +203,22 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     jumps = np.round(np.diff(signed, prepend=signed[0]) / (4.0 * np.pi))
     turns = -np.cumsum(jumps)
     turns -= turns[last]  # what came before the movement drops out too
-    at_full_turn = (length < TINY) & (w < 0)
-    principal = np.where(at_full_turn, signed[:, None] * axis, logarithm_factor(w, length) * v)
+    at_full_turn = (length < rotations.TINY) & (w < 0)
+    principal = np.where(at_full_turn, signed[:, None] * axis, rotations.logarithm_factor(w, length) * v)
     p = principal + (4.0 * np.pi * turns)[:, None] * axis
-    _check_continuous(p, q, offsets, where)
+    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    steps[offsets[1:-1] - 1] = 0.0
+    suspects = np.flatnonzero(steps > _SLACK)
+    turned = rotations.angle_between(q[suspects], q[suspects + 1])
+    broken = steps[suspects] > _SLACK + _STRETCH * turned
+    if broken.any():
+        k = int(np.argmax(broken))
+        row = int(suspects[k])
+        raise TrajectoryError(
+            f"{where(row)}: expected orientations within a full turn of the goal, or turning about one fixed axis "
+            f"beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad to the next sample while the "
+            f"orientation turns by {turned[k]:.3g} rad; split the movement there"
+        )
     return p
 
 
@@ -226,28 +231,12 @@ def _parity(flips: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _axes(v: Array, length: Array, offsets: NDArray[np.intp], movement: NDArray[np.intp]) -> Array:
     """Unit axes (total, 3); where v has none, that of the sample before, at the start that of the next one."""
     rows = np.arange(len(v))
-    clear = length[:, 0] >= TINY
+    clear = length[:, 0] >= rotations.TINY
     before = np.maximum.accumulate(np.where(clear, rows, -1))
     after = np.minimum.accumulate(np.where(clear, rows, len(v))[::-1])[::-1]
     chosen = np.where(before >= offsets[movement], before, after)
     chosen = np.where(chosen < offsets[movement + 1], chosen, rows)  # no sample of this movement has an axis
     return v[chosen] / np.where(clear[chosen], length[chosen, 0], 1.0)[:, None]
-
-
-def _check_continuous(p: Array, q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> None:
-    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
-    steps[offsets[1:-1] - 1] = 0.0
-    suspects = np.flatnonzero(steps > _SLACK)
-    turned = angle_between(q[suspects], q[suspects + 1])
-    broken = steps[suspects] > _SLACK + _STRETCH * turned
-    if broken.any():
-        k = int(np.argmax(broken))
-        row = int(suspects[k])
-        raise TrajectoryError(
-            f"{where(row)}: expected orientations within a full turn of the goal, or turning about one fixed axis "
-            f"beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad to the next sample while the "
-            f"orientation turns by {turned[k]:.3g} rad; split the movement there"
-        )
 
 
 def angular_velocity(p: ArrayLike, p_rate: ArrayLike) -> Array:
@@ -339,7 +328,7 @@ def _series(z: Any, coefficients: list[float]) -> Any:
 
 def _components(vectors: ArrayLike) -> Components:
     """One array each, contiguous where movements are computed in tiles; of one vector floats."""
-    array = as_vectors(vectors)
+    array = rotations.as_vectors(vectors)
     x, y, z = array.tolist() if array.ndim == 1 else np.moveaxis(array, -1, 0)
     return x, y, z
 

@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 
 from kineme.dmp.discrete.encode import check_movement
 from kineme.dmp.recorded_as import RecordedAs
-from kineme.dmp.rhythmic.operators import (
-    Complex,
-    RhythmicSpecification,
-    as_real,
-    encoder,
-    even_phases,
-    fit_harmonics,
-    waves,
-)
+from kineme.dmp.rhythmic import operators
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.trim import preprocess
@@ -51,7 +43,7 @@ _LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
 _ALMOST = 1 - 1e-6
 
 
-def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, Any]:
+def encode(dmp: operators.RhythmicSpecification, movements: MovementsLike) -> dict[str, Any]:
     """Learn one limit cycle per movement; see `RhythmicDMP.learn`."""
     recorded = Demonstrations.of(movements)
     demos = preprocess(recorded, dmp.preprocessing)
@@ -74,10 +66,10 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
         )
 
     _for_even_rows(demos, fold_tile)
-    series = as_real(coefficients)
-    shape = series[:, :, 1:] @ waves(even_phases(dmp.n_points), H)[:, 1:].T
+    series = operators.as_real(coefficients)
+    shape = series[:, :, 1:] @ operators.waves(operators.even_phases(dmp.n_points), H)[:, 1:].T
     return {
-        "scaled_weights": series @ encoder(dmp),
+        "scaled_weights": series @ operators.encoder(dmp),
         "baselines": starts + series[:, :, 0],
         "amplitudes": np.ptp(shape, axis=2).max(axis=1) / 2,
         "periods": demos.durations / estimated.cycles,
@@ -102,7 +94,7 @@ def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Arra
         for_tiles(tile, len(group), max(1, _TILE_SAMPLES // (demos.n_dims * length)))
 
 
-def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicity:
+def periodicity(dmp: operators.RhythmicSpecification, demos: Demonstrations) -> Periodicity:
     """Periods per recording: from the given period, or estimated; refused if there is none."""
     n = len(demos)
     if dmp.period is not None:
@@ -146,7 +138,7 @@ def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicit
 
 def fold(
     rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimension: int | None
-) -> tuple[Complex, Array, NDArray[np.intp], Array]:
+) -> tuple[operators.Complex, Array, NDArray[np.intp], Array]:
     """Average over periods by the least-squares Fourier series, then set the phase.
 
     For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
@@ -158,7 +150,7 @@ def fold(
     """
     n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
-    fit = fit_harmonics(rows - mean, cycles, n_harmonics)
+    fit = operators.fit_harmonics(rows - mean, cycles, n_harmonics)
     total = ((rows - mean) ** 2).sum(axis=(1, 2))
     explained = 1 - ((rows - mean - fit.fitted) ** 2).sum(axis=(1, 2)) / total
     missing = most + 1 - fit.coefficients.shape[2]
@@ -171,7 +163,7 @@ def fold(
     return coefficients * turn[:, None], phases, aligned_on, explained
 
 
-def start_phases(first: Complex) -> Array:
+def start_phases(first: operators.Complex) -> Array:
     """Phase of the first sample, of one first harmonic (n,) that is largest at phase 0: a maximum has a sign."""
     phases = np.angle(first) % (2 * np.pi)
     return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up to 2 pi
@@ -294,7 +286,7 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
     total = (rows**2).sum(axis=(1, 2))
 
     def unexplained(trial: Array) -> Array:
-        fit = fit_harmonics(rows, trial, n_harmonics)
+        fit = operators.fit_harmonics(rows, trial, n_harmonics)
         return np.asarray(((rows - fit.fitted) ** 2).sum(axis=(1, 2)) / total)
 
     # Change of `cycles` when the period changes by half a sample, or by what noise does to a valley.
@@ -315,10 +307,10 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
 
 def _newton_step(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> Array:
     """Gauss-Newton step of `cycles` on the residual, the series' own freedom projected out."""
-    fit = fit_harmonics(rows, cycles, n_harmonics)
+    fit = operators.fit_harmonics(rows, cycles, n_harmonics)
     position = np.linspace(0.0, 1.0, rows.shape[2])
     speed = _derivative(fit.coefficients, cycles, position) * position
-    free = speed - fit_harmonics(speed, cycles, n_harmonics).fitted
+    free = speed - operators.fit_harmonics(speed, cycles, n_harmonics).fitted
     return np.asarray(((rows - fit.fitted) * free).sum(axis=(1, 2)) / (free**2).sum(axis=(1, 2)))
 
 

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from kineme.dmp.discrete.operators import ridge_regression
 from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
 from kineme.dmp.spring_damper import SpringDamper
-from kineme.errors import SpecificationError
 from kineme.movements.preparation.trim import check_steps
 from kineme.validation import Array, check_choice, check_count, check_number
 
@@ -197,9 +196,7 @@ class VonMisesBasis:
 
     def __post_init__(self) -> None:
         check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
-        check_number("overlap", self.overlap, above=0.0)
-        if self.overlap >= 1:
-            raise SpecificationError(f"expected overlap to be below 1, got {self.overlap!r}")
+        check_number("overlap", self.overlap, above=0.0, below=1.0)
 
     @property
     def centers(self) -> Array:

@@ -116,28 +116,18 @@ class RhythmicDMP(RhythmicSpecification):
 class RhythmicPrimitives(Batch):
     """n limit cycles of d dimensions that share one specification; made by `RhythmicDMP.learn`.
 
-    Attributes
-    ----------
-    dmp : RhythmicDMP
-        The specification.
-    scaled_weights : ndarray of shape (n, d, N)
-        Weights times amplitude, ``r w``.
-    baselines : ndarray of shape (n, d)
-        b, the mean over whole periods, in the user's unit.
-    amplitudes : ndarray of shape (n,)
-        r, half of the largest minus the smallest position of the widest dimension, in the user's unit. One for all
-        dimensions: their proportions belong to the shape, and a dimension that does not move needs no division.
-    periods : ndarray of shape (n,)
-        Seconds.
-    phases : ndarray of shape (n,)
-        Phase at which the recording started, in [0, 2 pi). At phase 0 the first harmonic of the aligned dimension is
-        largest, so that recordings of one movement get the same weights wherever they start.
-    aligned_on : ndarray of shape (n,)
-        The aligned dimension.
-    explained : ndarray of shape (n,)
-        Share of the recording's variance that the folded cycle explains.
-    labels : ndarray of shape (n,) or None
-    names : tuple of str or None
+    - `dmp`: the specification.
+    - `scaled_weights` (n, d, N): weights times amplitude, ``r w``.
+    - `baselines` (n, d): b, the mean over whole periods, in the user's unit.
+    - `amplitudes` (n,): r, half of the largest minus the smallest position of the widest dimension, in the user's unit.
+      One for all dimensions: their proportions belong to the shape, and a dimension that does not move needs no
+      division.
+    - `periods` (n,): seconds.
+    - `phases` (n,): phase at which the recording started, in [0, 2 pi). At phase 0 the first harmonic of the aligned
+      dimension is largest, so that recordings of one movement get the same weights wherever they start.
+    - `aligned_on` (n,): the aligned dimension.
+    - `explained` (n,): share of the recording's variance that the folded cycle explains.
+    - `labels` (n,).
     """
 
     ROWS = {  # noqa: RUF012 - declared as a class variable by Batch

@@ -13,24 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.batch import Batch
+from kineme.dmp.discrete import via_points
 from kineme.dmp.discrete.modulate import Changed, loose_changes, warn_changed, warn_far
 from kineme.dmp.discrete.rollout import BaseRollout, Change
-from kineme.dmp.discrete.via_points import (
-    Span,
-    ViaLike,
-    ViaPoints,
-    broadcast_length,
-    check_durations,
-    per_movement,
-    via_points,
-)
 from kineme.dmp.rhythmic.encode import SAMPLES_PER_PERIOD
 from kineme.dmp.rhythmic.operators import RhythmicSpecification, as_real, even_phases, limit_cycle, waves
 from kineme.dmp.spring_damper import transitions
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_count, check_number, check_samples
 
-PHASES = Span(
+PHASES = via_points.Span(
     2.0 * np.pi,
     True,
     "via=[(phase, point), ...] or [((begin, end), points), ...] with phases from 0 to below 2 pi",
@@ -121,10 +113,10 @@ def rollout(
     """Check the options and broadcast them over the primitives; see `RhythmicPrimitives.rollout`."""
     vectors = ("baseline", "start", "velocity")
     given = {
-        name: per_movement(option, name, primitives.n_dims if name in vectors else None)
+        name: via_points.per_movement(option, name, primitives.n_dims if name in vectors else None)
         for name, option in options.items()
     }
-    n = broadcast_length(len(primitives), given)
+    n = via_points.broadcast_length(len(primitives), given)
 
     def fill(name: str, default: Array) -> Array:
         option = given[name]
@@ -133,7 +125,7 @@ def rollout(
 
     check_number("n_periods", n_periods, above=0.0)
     periods = fill("period", primitives.row("periods"))
-    check_durations("period", periods)
+    via_points.check_durations("period", periods)
     return RhythmicRollout(
         primitives,
         fill("amplitude", primitives.row("amplitudes")) / primitives.row("amplitudes"),
@@ -167,13 +159,17 @@ def _samples(
     return check_samples(check_count("n_samples", n_samples, 2), dmp.n_basis, "n_samples")
 
 
-def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> RhythmicRollout:
+def modulated(movement: RhythmicRollout, via: via_points.ViaLike | via_points.ViaPoints | None) -> RhythmicRollout:
     """The movement on the limit cycle that passes the via points; see `RhythmicPrimitives.rollout`."""
     if via is None:
         return movement
     dmp = movement.primitives.dmp
-    targets = via if isinstance(via, ViaPoints) else via_points(via, movement.baselines.shape[1], span=PHASES)
-    n = broadcast_length(len(movement), {"via": targets.points}, "movements")
+    targets = (
+        via
+        if isinstance(via, via_points.ViaPoints)
+        else via_points.via_points(via, movement.baselines.shape[1], span=PHASES)
+    )
+    n = via_points.broadcast_length(len(movement), {"via": targets.points}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
     if not movement.ratio.all():
         raise SpecificationError(

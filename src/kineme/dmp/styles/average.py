@@ -24,17 +24,7 @@ from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
-from kineme.dmp.styles.parameters import (
-    as_observations,
-    as_primitives,
-    from_numbers,
-    map_rows,
-    path_matrix,
-    shared_label,
-    to_numbers,
-    updated,
-    with_numbers,
-)
+from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import check_alike
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -53,19 +43,14 @@ class AveragePrimitive:
     With ``theta = [W, x0, g, tau v0]``, the ``d (N + 3)`` numbers that a path depends on linearly, the covariance is
     ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
 
-    Attributes
-    ----------
-    primitive : Primitives
-        The mean, a batch of one: roll it out, describe it, control with it as with any other. It knows nothing of the
-        covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points as the
-        demonstrations would.
-    factor : ndarray of shape (r, d, N + 3)
-        Centered, weighted deviations of theta from the mean; r is at most n and at most d (N + 3).
-    tempo_factor : ndarray of shape (r,)
-        The same for ln tau.
-    noise : float or None
-        Standard deviation of a path, at each time, around what the factor explains: how far each demonstration is from
-        the nearest weighted mean of the others. None where there are too few demonstrations to say, or too many.
+    - `primitive`: the mean, a batch of one: roll it out, describe it, control with it as with any other. It knows
+      nothing of the covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points
+      as the demonstrations would.
+    - `factor` (r, d, N + 3): centered, weighted deviations of theta from the mean; r is at most n and at most d (N +
+      3).
+    - `tempo_factor` (r,): the same for ln tau.
+    - `noise`: standard deviation of a path, at each time, around what the factor explains: how far each demonstration
+      is from the nearest weighted mean of the others. None where there are too few demonstrations to say, or too many.
     """
 
     primitive: Primitives
@@ -114,7 +99,9 @@ class AveragePrimitive:
         check_count("n_samples", n_samples, 2)
         check_choice("of", of, list(_DERIVATIVES))
         order = _DERIVATIVES[of]
-        deviations = map_rows(self.factor, path_matrix(self.primitive.dmp, n_samples, order))  # (r, d, S)
+        deviations = parameters.map_rows(
+            self.factor, parameters.path_matrix(self.primitive.dmp, n_samples, order)
+        )  # (r, d, S)
         variance = np.einsum("rds,rds->sd", deviations, deviations)
         return np.sqrt(variance) / self.primitive.durations[0] ** order
 
@@ -122,9 +109,9 @@ class AveragePrimitive:
         """Draw `n` new variants from the Gaussian with this mean and covariance, durations (log-normal) included."""
         check_count("n", n, 1)
         normal = np.random.default_rng(seed).standard_normal((n, len(self.factor)))
-        theta = to_numbers(self.primitive) + np.tensordot(normal, self.factor, axes=1)
+        theta = parameters.to_numbers(self.primitive) + np.tensordot(normal, self.factor, axes=1)
         durations = self.primitive.durations * np.exp(normal @ self.tempo_factor)
-        return with_numbers(self.primitive, theta, durations)
+        return parameters.with_numbers(self.primitive, theta, durations)
 
     def condition(
         self,
@@ -174,11 +161,11 @@ class AveragePrimitive:
         if times.ndim != 1 or not len(times) or not ((times >= 0.0) & (times <= 1.0)).all():
             raise SpecificationError(f"expected t between 0 and 1, as shares of the duration, got {t!r}")
         observed = (
-            None if position is None else as_observations("position", times, position, std, d),
-            None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),
+            None if position is None else parameters.as_observations("position", times, position, std, d),
+            None if velocity is None else parameters.as_observations("velocity", times, velocity, velocity_std, d),
         )
-        theta, duration, factor, tempo = updated(self.primitive, self.factor, self.tempo_factor, observed)
-        return AveragePrimitive(with_numbers(self.primitive, theta, duration), factor, tempo, self.noise)
+        theta, duration, factor, tempo = parameters.updated(self.primitive, self.factor, self.tempo_factor, observed)
+        return AveragePrimitive(parameters.with_numbers(self.primitive, theta, duration), factor, tempo, self.noise)
 
     def log_likelihood(self, movements: Primitives | MovementsLike, noise: float | None = None) -> Array:
         """Log probability density of the path of each movement, shape (n,), in nats.
@@ -206,13 +193,13 @@ class AveragePrimitive:
                 "movements"
             )
         check_number("noise", sigma, above=0.0)
-        matrix = path_matrix(self.primitive.dmp, self.primitive.dmp.n_points)
-        deviations = to_numbers(self._of_this_kind(movements)) - to_numbers(self.primitive)
-        paths = map_rows(deviations, matrix).reshape(len(deviations), -1)
+        matrix = parameters.path_matrix(self.primitive.dmp, self.primitive.dmp.n_points)
+        deviations = parameters.to_numbers(self._of_this_kind(movements)) - parameters.to_numbers(self.primitive)
+        paths = parameters.map_rows(deviations, matrix).reshape(len(deviations), -1)
         n_numbers = paths.shape[1]
         # With B = U diag(s) V' (r, d T) the path of the factor, ln N(e; 0, B' B + noise^2 I) follows from c = V' e, and
         # nothing of the size (d T)^2 is formed.
-        spread = map_rows(self.factor, matrix).reshape(len(self.factor), n_numbers)
+        spread = parameters.map_rows(self.factor, matrix).reshape(len(self.factor), n_numbers)
         _, s, Vt = np.linalg.svd(spread, full_matrices=False)
         along = paths @ Vt.T
         beside = np.sum((paths - along @ Vt) ** 2, axis=1)
@@ -250,12 +237,16 @@ class AveragePrimitive:
             raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
         own, its = self.primitive, self._of_this_kind(other.primitive)
         floor = _CERTAIN * float(max(own.extents.max(), its.extents.max()))
-        first, second = (to_numbers(own), self.factor), (to_numbers(its), other.factor)
+        first, second = (parameters.to_numbers(own), self.factor), (parameters.to_numbers(its), other.factor)
         theta, factor = blended(own.dmp, first, second, a, floor)
         share = float(a.mean())
         duration = own.durations ** (1.0 - share) * its.durations**share
-        label = shared_label(Primitives.concatenate([own, its])) if own.labels is not None is not its.labels else None
-        mean = from_numbers(own.dmp, theta, duration, label, merged([own.recorded_as, its.recorded_as]))
+        label = (
+            parameters.shared_label(Primitives.concatenate([own, its]))
+            if own.labels is not None is not its.labels
+            else None
+        )
+        mean = parameters.from_numbers(own.dmp, theta, duration, label, merged([own.recorded_as, its.recorded_as]))
         tempo = np.concatenate(((1.0 - share) * self.tempo_factor, share * other.tempo_factor))
         noises = [noise for noise in (self.noise, other.noise) if noise is not None]
         return AveragePrimitive(mean, factor, tempo, max(noises, default=None))
@@ -291,10 +282,10 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
     TrajectoryError
         No primitive, movements that cannot be learned, or weights of the wrong number, negative, infinite, or all zero.
     """
-    primitives = as_primitives(primitives)
+    primitives = parameters.as_primitives(primitives)
     p = _shares(weights, len(primitives))
     tempo = np.log(primitives.durations / primitives.durations[0])
-    numbers = to_numbers(primitives)
+    numbers = parameters.to_numbers(primitives)
     theta = np.column_stack((numbers.reshape(len(p), -1), tempo))
     mean = theta[0] + p @ (theta - theta[0])  # equal demonstrations give themselves to the last bit
     rest = 1.0 - p @ p
@@ -303,7 +294,7 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
         factor = np.linalg.qr(factor, mode="r")  # the same covariance from as few rows as it has columns
     shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
     duration = primitives.durations[:1] * np.exp(mean[-1:])
-    center = with_numbers(primitives, mean[:-1].reshape(1, *shape), duration)
+    center = parameters.with_numbers(primitives, mean[:-1].reshape(1, *shape), duration)
     noise = unexplained_noise(primitives.dmp, numbers[p > 0.0] - numbers[p > 0.0].mean(axis=0))
     return AveragePrimitive(center, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 
@@ -311,12 +302,9 @@ def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = 
 def average_by_label(primitives: Primitives | MovementsLike) -> dict[Any, AveragePrimitive]:
     """One `average` for each label, in sorted order.
 
-    Raises
-    ------
-    TrajectoryError
-        Primitives without labels.
+    Raises `TrajectoryError`: primitives without labels.
     """
-    primitives = as_primitives(primitives)
+    primitives = parameters.as_primitives(primitives)
     if primitives.labels is None:
         raise TrajectoryError(
             "expected labeled primitives, got none with a label; learn them from demonstrations with labels, "
@@ -347,9 +335,9 @@ def blended(
     dmp: Specification, first: tuple[Array, Array], other: tuple[Array, Array], activation: Array, floor: float
 ) -> tuple[Array, Array]:
     """Theta and factor of two averages blended with `activation` (T,); `floor` is the least deviation that counts."""
-    matrix = path_matrix(dmp, len(activation))
-    means = [map_rows(theta, matrix)[0].T for theta, _ in (first, other)]  # (T, d)
-    deviations = [map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (first, other)]  # (T, r, d)
+    matrix = parameters.path_matrix(dmp, len(activation))
+    means = [parameters.map_rows(theta, matrix)[0].T for theta, _ in (first, other)]  # (T, d)
+    deviations = [parameters.map_rows(factor, matrix).transpose(2, 0, 1) for _, factor in (first, other)]  # (T, r, d)
     a = np.stack((1.0 - activation, activation))[:, :, None, None]
     size = np.sqrt(sum(float(np.mean(np.sum(x**2, axis=1))) for x in deviations) / 2.0)
     least = max(_FLOOR * size, floor) ** 2 * np.eye(means[0].shape[1])
@@ -378,7 +366,7 @@ def unexplained_noise(dmp: Specification, deviations: Array) -> float | None:
     n, d, n_numbers = deviations.shape
     if n < 3 or n - 2 >= d * n_numbers:
         return None
-    paths = map_rows(deviations, path_matrix(dmp, dmp.n_points)).reshape(n, -1)
+    paths = parameters.map_rows(deviations, parameters.path_matrix(dmp, dmp.n_points)).reshape(n, -1)
     values, vectors = np.linalg.eigh(paths @ paths.T)
     values, vectors = values[1:], vectors[:, 1:]  # without the direction in which all are shifted
     if not values[0] > n * np.finfo(float).eps * values[-1]:

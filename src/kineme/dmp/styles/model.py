@@ -18,15 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import forcing_matrix
 from kineme.dmp.recorded_as import RecordedAs
-from kineme.dmp.styles.parameters import (
-    as_primitives,
-    from_numbers,
-    map_rows,
-    path_matrix,
-    shared_label,
-    shared_recording,
-    to_numbers,
-)
+from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels, check_alike
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -38,11 +30,11 @@ METRICS = ("path", "forcing")
 def compared(metric: str, dmp: DMP, theta: Array) -> Array:
     """Rows (n, d T) of what the styles explain: paths minus their start, or f times its scale, per sqrt(T)."""
     if metric == "path":
-        matrix = path_matrix(dmp, dmp.n_points)
+        matrix = parameters.path_matrix(dmp, dmp.n_points)
         matrix[-3] -= 1.0
     else:
         matrix = np.vstack((forcing_matrix(dmp, dmp.n_points).T, np.zeros((3, dmp.n_points))))
-    return map_rows(theta, matrix / np.sqrt(dmp.n_points)).reshape(len(theta), -1)
+    return parameters.map_rows(theta, matrix / np.sqrt(dmp.n_points)).reshape(len(theta), -1)
 
 
 _SLACK = 1e-9  # of the range: a demonstrated style is inside, whatever the rounding
@@ -63,14 +55,9 @@ class StyleModel:
     Every number of a primitive is affine in s, ``theta(s) = mean + s @ basis``, so styles mix like the
     demonstrations' paths do; ln tau is affine in s too. Style zero is the average.
 
-    Attributes
-    ----------
-    styles : ndarray of shape (n, J)
-        Of the demonstrations; each column has mean 0 and mean square 1.
-    singular_values : ndarray of shape (min(n, d T),)
-        Of all styles that could be told apart, not of the J kept ones only.
-    recorded_as : RecordedAs or None
-        Channels of the recordings, where they are known; see `channels`.
+    - `styles` (n, J): of the demonstrations; each column has mean 0 and mean square 1.
+    - `singular_values` (min(n, d T),): of all styles that could be told apart, not of the J kept ones only.
+    - `recorded_as`: channels of the recordings, where they are known; see `channels`.
     """
 
     dmp: DMP
@@ -137,7 +124,7 @@ class StyleModel:
             )
         theta = self.mean + np.tensordot(s, self.basis, axes=1)
         durations = self.duration * np.exp(s @ self.tempo_basis)
-        return from_numbers(self.dmp, theta, durations, self.label, self.recorded_as)
+        return parameters.from_numbers(self.dmp, theta, durations, self.label, self.recorded_as)
 
     def interpolate(self, style_a: ArrayLike, style_b: ArrayLike, n: int, extrapolate: bool = False) -> Primitives:
         """`n` primitives at even steps from one style to another, both included; errors as in `primitive`."""
@@ -170,7 +157,7 @@ class StyleModel:
             raise SpecificationError(f"expected movements of {len(self.mean)} dimensions, got {primitives.n_dims}")
         ours = None if self.recorded_as is None else self.recorded_as.moving
         check_alike([ours, primitives.moving_channels], "movement")
-        rest = compared(self.metric, self.dmp, to_numbers(primitives) - self.mean)
+        rest = compared(self.metric, self.dmp, parameters.to_numbers(primitives) - self.mean)
         styles = rest @ (self.directions / np.sum(self.directions**2, axis=1, keepdims=True)).T  # they are orthogonal
         residuals = np.linalg.norm(rest - styles @ self.directions, axis=1)
         return StyleEstimate(styles, residuals, np.all(self._inside(styles), axis=1))
@@ -222,11 +209,11 @@ def learn_styles(
     SpecificationError
         More styles than the demonstrations can tell apart; both `n_styles` and `variance`; a parameter out of range.
     """
-    primitives = as_primitives(primitives)
+    primitives = parameters.as_primitives(primitives)
     check_choice("metric", metric, list(METRICS))
     if len(primitives) < 2:
         raise TrajectoryError(f"expected at least 2 demonstrations to learn styles from, got {len(primitives)}")
-    theta = to_numbers(primitives)
+    theta = parameters.to_numbers(primitives)
     mean = theta[0] + np.mean(theta - theta[0], axis=0)
     U, S, Vt = np.linalg.svd(compared(metric, primitives.dmp, theta - mean), full_matrices=False)
     X, n = compared(metric, primitives.dmp, theta), len(theta)
@@ -246,8 +233,8 @@ def learn_styles(
         duration=float(primitives.durations[0] * np.exp(tempo.mean())),
         tempo_basis=styles.T @ (tempo - tempo.mean()) / n,
         directions=sign * Vt[:J] * S[:J, None] / np.sqrt(n),
-        label=shared_label(primitives),
-        recorded_as=shared_recording(primitives),
+        label=parameters.shared_label(primitives),
+        recorded_as=parameters.shared_recording(primitives),
     )
 
 

@@ -72,7 +72,10 @@ class ZarrArray:
         check_expanded(math.prod(shape) * max(8, self.dtype.itemsize))
         values, tall = np.full(shape, self._fill, self.dtype), self._chunks[0]
         for place in self._places(first, last):
-            chunk = self._chunk(place)
+            if self._last[0] != place:
+                data = self._files.read(self._key(place))
+                self._last = place, None if data is None else self._unpacked(data)
+            chunk = self._last[1]
             if chunk is None:
                 continue
             starts = [k * width for k, width in zip(place, self._chunks, strict=True)]
@@ -100,12 +103,6 @@ class ZarrArray:
 
     def _key(self, place: tuple[int, ...]) -> str:
         return f"{self.name}/{self._between.join(map(str, place))}"
-
-    def _chunk(self, place: tuple[int, ...]) -> NDArray[Any] | None:
-        if self._last[0] != place:
-            data = self._files.read(self._key(place))
-            self._last = place, None if data is None else self._unpacked(data)
-        return self._last[1]
 
     def _unpacked(self, data: bytes) -> NDArray[Any]:
         n_bytes = math.prod(self._chunks) * self.dtype.itemsize

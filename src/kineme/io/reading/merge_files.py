@@ -42,41 +42,18 @@ _HINT = "check the order of the columns, or divide the quaternions by their norm
 
 
 class Source(NamedTuple):
-    """The source of a movement.
+    """The source of a movement."""
 
-    Attributes
-    ----------
-    path : str
-        Relative to the folder that was read, with forward slashes; the name of the file if one file was read.
-    sha256 : str
-        Of the file's bytes, in hexadecimal.
-    size : int
-        Bytes.
-    mtime : float
-        Last modification of the file, in seconds since 1970.
-    place : str
-        Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
-    label : str or None
-    person : str or None
-        Who showed it, where a column or ``label_pattern`` says it.
-    filled : int
-        Number of samples of which missing values are interpolated.
-    longest_gap : float
-        Longest gap that was filled, from the sample before to the sample after [s].
-    cropped : float
-        Time at both ends that was left out, since columns have no values there [s].
-    """
-
-    path: str
-    sha256: str
-    size: int
-    mtime: float
-    place: str
+    path: str  # relative to the folder that was read, with forward slashes; the name of the file if one was read
+    sha256: str  # of the file's bytes, in hexadecimal
+    size: int  # bytes
+    mtime: float  # last modification of the file, in seconds since 1970
+    place: str  # which movement of the file: its key in a long table, its index in arrays; empty if there is but one
     label: str | None
-    person: str | None = None
-    filled: int = 0
-    longest_gap: float = 0.0
-    cropped: float = 0.0
+    person: str | None = None  # who showed it, where a column or ``label_pattern`` says it
+    filled: int = 0  # number of samples of which missing values are interpolated
+    longest_gap: float = 0.0  # that was filled, from the sample before to the sample after [s]
+    cropped: float = 0.0  # time at both ends that was left out, since columns have no values there [s]
 
     @property
     def name(self) -> str:
@@ -90,18 +67,11 @@ class Recordings(MovementSequence):
 
     A sequence of `Trajectory`, taken wherever movements are expected.
 
-    Attributes
-    ----------
-    demonstrations : Demonstrations
-        The movements of the most frequent number of dimensions (of two equally frequent, the one met first); those
-        of other dimensions are among the problems. They carry labels if every one of them has one.
-    sources : tuple of Source
-        One per movement.
-    problems : tuple of Problem
-    detected : tuple of (Detected, int)
-        How files were understood, and how many in this way; most frequent first.
-    notes : tuple of str
-        What else a person should know of how they were read.
+    - `demonstrations`: the movements of the most frequent number of dimensions (of two equally frequent, the one met
+      first); those of other dimensions are among the problems. They carry labels if every one of them has one.
+    - `sources`: one per movement.
+    - `detected`: how files were understood, and how many in this way; most frequent first.
+    - `notes`: what else a person should know of how they were read.
     """
 
     demonstrations: Demonstrations
@@ -137,12 +107,6 @@ class Recordings(MovementSequence):
         n_files = len({source.path for source in self.sources})
         files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
         return f"Recordings({self.demonstrations!r}, {files}, {problems})"
-
-    def without_labels(self) -> Recordings:
-        """Return the same movements, with no label on any."""
-        plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
-        sources = tuple(source._replace(label=None) for source in self.sources)
-        return replace(self, demonstrations=plain, sources=sources)
 
 
 def merge_files(

@@ -183,7 +183,10 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
 ) -> Recordings:
     """Read recordings as `read_recordings` does, and the standard input as a file of some name."""
     max_file_bytes()
-    _check_rule(rule, layout)
+    if rule.label_by is not None and layout.label is not None:
+        raise SpecificationError("expected label or label_by, not both")
+    if rule.names_person and layout.person is not None:
+        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
     entries, problems = entries_of(paths, follow_links)
     recordings = read_entries(
         entries,
@@ -200,14 +203,6 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     given = [] if standard_input is None else [Path(standard_input[0])]
     check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
     return recordings
-
-
-def _check_rule(rule: NameRule, layout: Layout) -> None:
-    """Refuse two origins of a label, or of a person."""
-    if rule.label_by is not None and layout.label is not None:
-        raise SpecificationError("expected label or label_by, not both")
-    if rule.names_person and layout.person is not None:
-        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
 
 
 def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has found
@@ -288,14 +283,9 @@ def trimmed(recordings: Recordings) -> Recordings:
 def read_recording(path: str | Path) -> Trajectory:
     """Read a file that holds one movement, in any format of `kineme.io.reading.formats.FORMATS`.
 
-    Raises
-    ------
-    DataError
-        The file is not what its name says, or holds several movements; the message names the line.
-    FileNotFoundError
-        There is no such file.
-    TrajectoryError
-        The numbers are no movement, see `Trajectory`.
+    Raises `DataError`: the file is not what its name says, or holds several movements; the message names the line.
+    Raises `FileNotFoundError`: there is no such file. Raises `TrajectoryError`: the numbers are no movement, see
+    `Trajectory`.
     """
     path = Path(path)
     if data_set_of(path) is None:

@@ -95,7 +95,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
         stack.callback(reader.close)
         with refused("expected the topics of a bag of ROS", remedy):
             if ending == ".bag":
-                bound_chunks_of_ros_1(reader)
+                for at, chunk in reader.chunks.items():
+                    check_in_passing(chunk.datasize, f"a chunk at byte {at:,}")
+                    reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
             elif folder.compression == "message":  # expanded here, up to a limit
                 reader.storage.metadata = reader.storage.metadata._replace(compression_mode=None)
             topics = _topics(reader.connections)
@@ -267,13 +269,6 @@ def _decompressor(compression: str) -> Callable[[], Any]:
     from rosbags.rosbag2.storage_mcap import zstd
 
     return zstd.ZstdDecompressor
-
-
-def bound_chunks_of_ros_1(reader: Any) -> None:
-    """Bound every chunk of an open bag of ROS 1."""
-    for at, chunk in reader.chunks.items():
-        check_in_passing(chunk.datasize, f"a chunk at byte {at:,}")
-        reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
 
 
 def records_of_mcap(file: BinaryIO, validate_crcs: bool = False) -> Iterator[Any]:

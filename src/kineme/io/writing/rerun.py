@@ -137,12 +137,8 @@ def write_rerun(path: Path, scenes: Iterable[Scene], *, replace: bool = False) -
     sample: paths and moving points below ``points``, curves below ``signals``, states below ``symbols``. The blueprint
     in the file lays them out, in tabs where there are several.
 
-    Raises
-    ------
-    DataError
-        Another ending than .rrd; no package rerun-sdk; Rerun switched off by its environment variable; no scene.
-    OSError
-        A file that is there, unless it is replaced; a folder that cannot be written to.
+    Raises `DataError`: another ending than .rrd; no package rerun-sdk; Rerun switched off by its environment variable;
+    no scene. Raises `OSError`: a file that is there, unless it is replaced; a folder that cannot be written to.
     """
     if path.suffix.lower() != ENDING:
         raise DataError(f"expected a file ending in {ENDING} for Rerun, got {path.suffix or 'no ending'!r}")

@@ -19,19 +19,11 @@ _HIDDEN = "***"
 
 @dataclass(frozen=True)
 class Address:
-    """The address of a library on a server; as text and in every message without its password.
+    """The address of a library on a server; as text and in every message without its password."""
 
-    Attributes
-    ----------
-    uri : str
-        As libpq takes it, with the password, if there is one in it. Others are read by libpq from PGPASSWORD, a
-        password file or a service.
-    schema : str
-        The namespace of the library's tables, one for each library.
-    """
-
+    #: As libpq takes it; a password that it lacks libpq reads from PGPASSWORD, a password file or a service.
     uri: str = field(repr=False)
-    schema: str
+    schema: str  # the namespace of the library's tables, one for each library
     shown: str
 
     def __str__(self) -> str:
@@ -50,13 +42,7 @@ class Address:
 
     @classmethod
     def of(cls, text: str) -> Address:
-        """Read ``postgresql://user@host:port/database?schema=name``; other parameters are those of libpq.
-
-        Raises
-        ------
-        SpecificationError
-            Two schemas, or a name that cannot be one.
-        """
+        """Read ``postgresql://user@host:port/database?schema=name``; other parameters are those of libpq."""
         uri, mark, query = text.partition("?")
         parameters = [part for part in query.split("&") if part]
         schemas = [unquote(part.partition("=")[2]) for part in parameters if part.startswith("schema=")]

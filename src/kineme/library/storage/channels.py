@@ -56,16 +56,9 @@ def with_channels(stored: Movements, channels: Channels, rows: Sequence[Row]) ->
     for row, n in zip(rows, np.diff(stored.offsets).tolist(), strict=True):
         if len(row[1]) != size * n:
             raise strange("recorded", row)
-    return replace(
-        movements, recorded=_from_bytes([row[1] for row in rows], stored.positions, stored.offsets, channels)
-    )
-
-
-def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
-    """Return what was recorded (total, columns): the stored columns, and the positions where they say it."""
     others = other_columns(channels)
-    recorded = np.empty((len(positions), sum(len(channel.columns) for channel in channels)))
-    recorded[:, others] = np.frombuffer(b"".join(blobs), np.float32).reshape(-1, len(others))
+    recorded = np.empty((len(stored.positions), sum(len(channel.columns) for channel in channels)))
+    recorded[:, others] = np.frombuffer(b"".join([row[1] for row in rows]), np.float32).reshape(-1, len(others))
     for k in columns_of_kinds(channels, "discrete"):
         # The shortest decimals that round to the stored single precision: 0.08, and not 0.0799999982.
         starts = np.flatnonzero(np.diff(recorded[:, k], prepend=np.nan))  # of the stretches in which a value holds
@@ -73,5 +66,5 @@ def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.in
         exact = np.array([float(str(value)) for value in values])[which]
         recorded[:, k] = np.repeat(exact, np.diff(starts, append=len(recorded)))
     learned = [channel.kind != "orientation" for channel in channels for _ in channel.coordinates]
-    recorded[:, columns_of_kinds(channels, "position", "angle")] = positions[:, learned]
-    return canonical(recorded, offsets, channels)
+    recorded[:, columns_of_kinds(channels, "position", "angle")] = stored.positions[:, learned]
+    return replace(movements, recorded=canonical(recorded, stored.offsets, channels))

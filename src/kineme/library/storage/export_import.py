@@ -10,17 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kineme.errors import DataError
+from kineme.library.storage import connection as sqlite
 from kineme.library.storage.address import Address, as_location
-from kineme.library.storage.connection import (
-    FILE,
-    LOGS,
-    check_alone,
-    check_kind,
-    connect,
-    in_plain_words,
-    migrate,
-    new_database,
-)
 from kineme.library.storage.rows import damage
 from kineme.library.storage.safety import defend_foreign, limited
 from kineme.library.storage.schema import SCHEMA_VERSION
@@ -37,7 +28,7 @@ def export(store: Store, path: str | Path) -> Path:
     with _new(target) as beside:
         with store.database(beside) as connection:
             _copy(connection, store, beside)
-        with closing(connect(beside, "rw", store.wait)) as copy:
+        with closing(sqlite.connect(beside, "rw", store.wait)) as copy:
             copy.execute("PRAGMA schema_version = 1")  # a counter of VACUUM, which is not content
     return target
 
@@ -50,7 +41,7 @@ def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
     except sqlite3.OperationalError as error:
         if error.sqlite_errorcode != sqlite3.SQLITE_INTERRUPT:  # of the new file
             raise
-        with in_plain_words(store.path, store.wait):
+        with sqlite.in_plain_words(store.path, store.wait):
             raise
 
 
@@ -66,12 +57,20 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
 
         with TemporaryDirectory() as checked:
             import_(source, checked, wait)
-            with closing(Store(Path(checked) / FILE, read_only=True, wait=wait)) as store:
+            with closing(Store(Path(checked) / sqlite.FILE, read_only=True, wait=wait)) as store:
                 return move_in(store, location)
-    target = location / FILE
-    _check_file(source)
+    target = location / sqlite.FILE
+    if not source.is_file():
+        got = "something else" if source.exists() else "no file"
+        raise DataError(f"expected an exported library at {source}, found {got} there")
+    for log in (source.with_name(source.name + end) for end in sqlite.LOGS):
+        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
+            raise DataError(
+                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
+                "import that file"
+            )
     location.mkdir(parents=True, exist_ok=True)
-    check_alone(target)
+    sqlite.check_alone(target)
     with _new(target) as beside:
         # Refuse a file that would fill the disk; a sparse file may be larger than its disk.
         size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
@@ -80,34 +79,21 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
                 f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some"
             )
         shutil.copyfile(source, beside)
-        with _named(beside, source), in_plain_words(source, wait):
+        with _named(beside, source), sqlite.in_plain_words(source, wait):
             _check_structure(beside, source, wait)
-            with closing(connect(beside, "rw", wait)) as copy:
-                if check_kind(copy, source) < SCHEMA_VERSION:
-                    migrate(copy, source)
+            with closing(sqlite.connect(beside, "rw", wait)) as copy:
+                if sqlite.check_kind(copy, source) < SCHEMA_VERSION:
+                    sqlite.migrate(copy, source)
                 copy.execute("PRAGMA journal_mode = WAL")
             _check(beside, source, wait)
     return target
 
 
-def _check_file(source: Path) -> None:
-    """Refuse anything but one complete file."""
-    if not source.is_file():
-        got = "something else" if source.exists() else "no file"
-        raise DataError(f"expected an exported library at {source}, found {got} there")
-    for log in (source.with_name(source.name + end) for end in LOGS):
-        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
-            raise DataError(
-                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
-                "import that file"
-            )
-
-
 def _check_structure(beside: Path, source: Path, wait: float) -> None:
     """Refuse definitions that are not ours, and pages that do not form tables, before rows are read."""
-    with closing(connect(beside, "ro", wait)) as copy, limited(copy, beside):
+    with closing(sqlite.connect(beside, "ro", wait)) as copy, limited(copy, beside):
         defend_foreign(copy, beside)
-        check_kind(copy, source)
+        sqlite.check_kind(copy, source)
         verdict = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
         if verdict != "ok":
             raise _refusal(source, 1, f"the file: {' '.join(verdict.split())}")
@@ -145,7 +131,7 @@ def _new(target: Path) -> Iterator[Path]:
     if not target.parent.is_dir():
         raise DataError(f"expected a folder {target.parent} to write {target.name} into, there is none; create it")
     try:
-        with in_plain_words(target, 0.0), new_database(target) as beside:
+        with sqlite.in_plain_words(target, 0.0), sqlite.new_database(target) as beside:
             yield beside
     except FileExistsError as error:
         raise DataError(f"expected a new file, but {target} is there already; choose another, or move it") from error

@@ -313,7 +313,11 @@ class ServerConnection:
             self._commit()
             self._inside = False
         except BaseException:
-            self._roll_back()
+            with suppress(KinemeError):  # of a connection that is cut nothing is stored, and no lock is left
+                if not self._session.closed:
+                    self.run("ROLLBACK")
+                    self.run("SELECT pg_advisory_unlock_all()")  # which a transaction does not hold
+            self._inside = False
             raise
 
     def _lock_all(self) -> None:
@@ -369,13 +373,6 @@ class ServerConnection:
             query = f"SELECT coalesce(max({column}), 0) FROM {table} WHERE {column} < %s"
             if self.run(query, [key]).fetchone()[0] != key - 1:
                 raise ConflictError(_CONFLICT.format(path=self.address, error="a writer before it failed"))
-
-    def _roll_back(self) -> None:
-        with suppress(KinemeError):  # of a connection that is cut nothing is stored, and no lock is left
-            if not self._session.closed:
-                self.run("ROLLBACK")
-                self.run("SELECT pg_advisory_unlock_all()")  # which a transaction does not hold
-        self._inside = False
 
     def _commit(self) -> None:
         """Commit; where the connection is cut meanwhile, look by another one whether the version is there."""

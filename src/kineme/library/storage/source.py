@@ -20,20 +20,10 @@ from kineme.movements.tables.layout import Known
 class Source:
     """A file of recordings.
 
-    Parameters
-    ----------
-    path : str
-        As given by the user; never opened again.
-    sha256 : str
-        Hash of its bytes. Equal bytes read with equal options are the same source, whatever their path.
-    size : int
-        In bytes.
-    kind : str
-        Format: "csv", "npz", ...
-    options : mapping
-        Options of the reader: columns, units; anything that JSON can represent.
-    read_at : str
-        Time, ISO 8601.
+    - `path`: as given by the user; never opened again.
+    - `sha256`: hash of its bytes. Equal bytes read with equal options are the same source, whatever their path.
+    - `size`: in bytes; `kind`: format, "csv", "npz", ...; `read_at`: time, ISO 8601.
+    - `options`: of the reader: columns, units; anything that JSON can represent.
     """
 
     path: str

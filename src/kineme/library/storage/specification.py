@@ -14,14 +14,8 @@ from kineme.dmp.discrete.dmp import DMP
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.kernels.rotation import RotationPrior
 from kineme.library.storage.rows import parsed
+from kineme.similarity import specification as compared
 from kineme.similarity.similarity import WEIGHTS
-from kineme.similarity.specification import (
-    ROW_REPRESENTATIONS,
-    Compares,
-    ComparisonSpecification,
-    Normalization,
-    Representation,
-)
 from kineme.validation import check_choice, check_number
 
 if TYPE_CHECKING:
@@ -30,7 +24,7 @@ if TYPE_CHECKING:
 _MOST = 100_000  # dimensions
 
 
-class Recognizes(Compares, Protocol):
+class Recognizes(compared.Compares, Protocol):
     """A `kineme.Recognizer`, fitted or not, as far as a library keeps it."""
 
     classifier: str
@@ -41,7 +35,7 @@ class Recognizes(Compares, Protocol):
 class Specification:
     """Specification of how the movements of a library are compared and recognized, and how they move again."""
 
-    comparison: ComparisonSpecification = field(default_factory=ComparisonSpecification)
+    comparison: compared.ComparisonSpecification = field(default_factory=compared.ComparisonSpecification)
     classifier: str = "auto"  # this and the weights of the representations as of `kineme.Recognizer`
     weights: str | tuple[float, ...] = "auto"
     dmp: DMP = field(default_factory=DMP)  # of the primitives
@@ -70,7 +64,7 @@ class Specification:
         return cls(recognizer.specification, recognizer.classifier, plain, dmp)
 
     @property
-    def representations(self) -> tuple[Representation, ...]:
+    def representations(self) -> tuple[compared.Representation, ...]:
         """The representations that movements are compared in; features of those by pairs are made from stored ones."""
         return self.comparison.representations
 
@@ -85,7 +79,6 @@ class Specification:
         return Recognizer(**self._parameters())
 
     def _parameters(self) -> dict[str, Any]:
-        """Return the parameters of that recognizer."""
         how = self.comparison
         return {
             "representations": how.representations,
@@ -129,16 +122,16 @@ def _of_texts(recognizer: str, dmp_text: str) -> Specification:
     before = any("signal" not in fields for fields in parameters["representations"])
     if before and parameters.get("weights", "auto") == "auto":
         parameters["weights"] = "own"
-    own = (Representation(**{"signal": False} | fields) for fields in parameters["representations"])
+    own = (compared.Representation(**{"signal": False} | fields) for fields in parameters["representations"])
     parameters["representations"] = tuple(own)
     if (prior := parameters.get("rotation_prior")) is not None:
         vertical = None if prior["vertical"] is None else tuple(prior["vertical"])
         parameters["rotation_prior"] = RotationPrior(**prior | {"vertical": vertical})
     if not isinstance(weights := parameters.get("weights", "auto"), str):
         parameters["weights"] = tuple(map(float, weights))
-    normalization = Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))
-    comparison = ComparisonSpecification(
-        parameters.pop("representations", ROW_REPRESENTATIONS),
+    normalization = compared.Normalization(parameters.pop("translation", True), parameters.pop("scale", "path"))
+    comparison = compared.ComparisonSpecification(
+        parameters.pop("representations", compared.ROW_REPRESENTATIONS),
         normalization,
         parameters.pop("cutoff", 10.0),
         parameters.pop("max_angle", None),

@@ -16,18 +16,9 @@ from threading import Lock, RLock
 from typing import Any, NamedTuple, TypeVar
 
 from kineme.errors import DataError, SpecificationError
+from kineme.library.storage import connection as sqlite
 from kineme.library.storage import safety
 from kineme.library.storage.channels import channels_of_text
-from kineme.library.storage.connection import (
-    ConflictError,
-    check_kind,
-    checked_meta,
-    connect,
-    create,
-    in_plain_words,
-    migrate,
-    transaction,
-)
 from kineme.library.storage.rows import Database, Row, damaged, insert, next_key, parsed_column, seal, select
 from kineme.library.storage.safety import size_of
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
@@ -80,11 +71,11 @@ class Store:
                     "make one by learning (in Python, with create=True), or correct the path"
                 )
             self._create({"id": str(uuid.uuid4()), **specification.to_json()})
-        with in_plain_words(self.path, wait), safety.awake():
+        with sqlite.in_plain_words(self.path, wait), safety.awake():
             self._reader: Any = self._connect()
             try:
                 self._check_kind()
-                meta = checked_meta(self._reader, self.path)
+                meta = sqlite.checked_meta(self._reader, self.path)
                 self.id = meta["id"]
                 self.specification = Specification.from_json(meta, self.path)
                 last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
@@ -105,11 +96,11 @@ class Store:
         return f"no {self.path.name}"
 
     def _create(self, meta: dict[str, str]) -> None:
-        create(self.path, meta)
+        sqlite.create(self.path, meta)
 
     def _connect(self) -> Database:
         safety.refuse_if_lost(self.path)
-        return connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
+        return sqlite.connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
 
     def sleep(self) -> None:
         """Close the connections for a fork; the next read or write opens them again."""
@@ -148,10 +139,10 @@ class Store:
     def _kind(self) -> int:
         """Return the version of the schema; refused if it is a later one, or no library."""
         self._file = self.path.stat().st_ino
-        return check_kind(self._reader, self.path)
+        return sqlite.check_kind(self._reader, self.path)
 
     def _migrate(self) -> None:
-        migrate(self._reader, self.path)
+        sqlite.migrate(self._reader, self.path)
 
     @property
     def folder(self) -> Any:
@@ -171,7 +162,7 @@ class Store:
     def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
         """Context manager: the library as a database of SQLite of which a copy is written, within limits."""
         with (
-            closing(connect(self.path, "ro", self.wait)) as connection,
+            closing(sqlite.connect(self.path, "ro", self.wait)) as connection,
             safety.limited_copy(connection, self.path, copy),
         ):
             yield connection
@@ -179,7 +170,7 @@ class Store:
     @contextmanager
     def snapshot(self) -> Iterator[Database]:
         """Context manager: a connection of its own that sees the library at one moment, within limits."""
-        with closing(connect(self.path, "ro", self.wait)) as connection, safety.limited(connection, self.path):
+        with closing(sqlite.connect(self.path, "ro", self.wait)) as connection, safety.limited(connection, self.path):
             connection.execute("BEGIN")
             yield connection
 
@@ -222,7 +213,7 @@ class Store:
 
         One thread reads at a time; it may nest readings.
         """
-        with safety.awake(), in_plain_words(self.path, self.wait):
+        with safety.awake(), sqlite.in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
             with self._read_turn:
@@ -254,7 +245,7 @@ class Store:
     @contextmanager
     def _transaction(self, writer: Any, reserve: Mapping[str, int]) -> Iterator[dict[str, int]]:
         """Return a transaction, and the first keys that are reserved in each table: none."""
-        with transaction(writer):
+        with sqlite.transaction(writer):
             yield {}
 
     @contextmanager
@@ -266,7 +257,7 @@ class Store:
         `reserve` is how many rows it adds to each table whose rows are numbered, if that is known, for stores in which
         `many_write`: a ConflictError if it adds others, or if what others write does not fit; nothing is stored then.
         """
-        with safety.awake(), in_plain_words(self.path, self.wait):
+        with safety.awake(), sqlite.in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
             with self._write_turn:
@@ -292,7 +283,7 @@ class Store:
                         and first
                         and any(change.reserved[table] != first[table] + reserve[table] for table in first)
                     ):
-                        raise ConflictError(f"expected {dict(reserve)} rows, got others; run it again")
+                        raise sqlite.ConflictError(f"expected {dict(reserve)} rows, got others; run it again")
 
     def check_writable(self) -> None:
         """Refuse to write if opened for reading, or if the file is no longer the one that was opened.
@@ -343,7 +334,7 @@ def repeated(change: Callable[..., Result]) -> Callable[..., Result]:
     @wraps(change)
     def again(*arguments: Any, **options: Any) -> Result:
         for _ in range(_TRIES - 1):
-            with suppress(ConflictError):  # nothing of it was stored
+            with suppress(sqlite.ConflictError):  # nothing of it was stored
                 return change(*arguments, **options)
         return change(*arguments, **options)
 
@@ -359,19 +350,7 @@ def history(store: Store) -> tuple[Version, ...]:
 
 @dataclass(frozen=True)
 class Version:
-    """One version.
-
-    Attributes
-    ----------
-    id : int
-        Its number, from 1.
-    at : str
-        When it was committed, ISO 8601, UTC.
-    action : str
-        "learn", "rename", ...
-    detail : mapping
-        Details of the change.
-    """
+    """A version: its number from 1, when it was committed (ISO 8601, UTC), "learn", "rename", ..., and details."""
 
     id: int
     at: str

@@ -13,19 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.library.storage import rows as sql
 from kineme.library.storage.read import groups, movements, records
-from kineme.library.storage.rows import (
-    ALIVE,
-    Database,
-    Row,
-    among,
-    check_text,
-    damage,
-    damaged,
-    listed,
-    parsed_column,
-    select,
-)
 from kineme.library.storage.schema import COLUMNS, MAX_TEXT
 from kineme.library.storage.store import Change, Moment, Store
 
@@ -39,21 +28,12 @@ HOW = ("label", "anchored", "recognized")
 class Symbol:
     """A name for movements of one class.
 
-    Attributes
-    ----------
-    id : str
-        "sym-..."; stays when the name changes.
-    name, description : str
-    members : ndarray of shape (k,)
-        Ids of its movements, ascending; read-only.
-    prototype : int or None
-        Id of the movement that represents it.
-    threshold : float or None
-        Largest nonconformity of a member, if set.
-    parents : tuple of str
-        Ids of the symbols that it was merged or split from.
-    created, changed : int
-        Versions that created it, and that last changed its name, description, prototype or threshold.
+    - `id`: "sym-..."; stays when the name changes.
+    - `members` (k,): ids of its movements, ascending; read-only. `prototype`: id of the most typical, or None.
+    - `threshold`: largest nonconformity of a member, if set.
+    - `parents`: ids of the symbols that it was merged or split from.
+    - `created`, `changed`: versions that created it, and that last changed its name, description, prototype or
+      threshold.
     """
 
     id: str
@@ -77,9 +57,9 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
     """Return all symbols, by name."""
     with store.reading() as connection:
         moment = store.moment(connection)
-        states = select(connection, "symbol_state", ALIVE, {"v": moment.version})
+        states = sql.select(connection, "symbol_state", sql.ALIVE, {"v": moment.version})
         if len(states) != moment.symbols:
-            raise damage(f"{moment.symbols} symbols", f"{len(states)}: damaged bytes")
+            raise sql.damage(f"{moment.symbols} symbols", f"{len(states)}: damaged bytes")
         return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
@@ -99,41 +79,43 @@ def exists(store: Store, who: object) -> bool:
         return False
 
 
-def state_of(connection: Database, who: str, version: int) -> Row:
+def state_of(connection: sql.Database, who: str, version: int) -> sql.Row:
     """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id."""
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
         try:
-            states = select(connection, "symbol_state", f"{condition} AND {ALIVE}", {"who": who, "v": version})
+            states = sql.select(connection, "symbol_state", f"{condition} AND {sql.ALIVE}", {"who": who, "v": version})
         except UnicodeEncodeError:
             break
         if states:
             return states[0]
-    names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {ALIVE}", {"v": version})]
+    names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {sql.ALIVE}", {"v": version})]
     like = difflib.get_close_matches(str(who)[:_ALIKE], [name[:_ALIKE] for name in names], 3) or sorted(names)[:5]
     others = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
     raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {others}")
 
 
-def _with_members(connection: Database, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
+def _with_members(connection: sql.Database, moment: Moment, states: Sequence[sql.Row]) -> list[Symbol]:
     keys = [row[1] for row in states]
-    about = {row[0]: row[1:] for row in select(connection, "symbol", among("key"), {"keys": listed(keys)})}
+    about = {row[0]: row[1:] for row in sql.select(connection, "symbol", sql.among("key"), {"keys": sql.listed(keys)})}
     if lost := set(keys) - about.keys():
-        raise damaged("symbol", (min(lost),))
+        raise sql.damaged("symbol", (min(lost),))
     members, every = _members(connection, keys, moment), []
     for row in states:
         _, key, name, description, prototype, threshold, _, added, _ = row
-        parents = tuple(parsed_column("symbol_state", row, "parents", list))
+        parents = tuple(sql.parsed_column("symbol_state", row, "parents", list))
         id_, created = about[key]
         every.append(Symbol(id_, name, description, members[key], prototype, threshold, parents, created, added))
     return every
 
 
-def _members(connection: Database, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
-    rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
-    n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
+def _members(connection: sql.Database, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
+    rows = sql.select(
+        connection, "member", f"{sql.among('symbol')} AND {sql.ALIVE}", {"keys": sql.listed(keys), "v": moment.version}
+    )
+    n = connection.execute(f"SELECT count(*) FROM member WHERE {sql.ALIVE}", {"v": moment.version}).fetchone()[0]
     if n != moment.members:
-        raise damage(f"{moment.members} members of symbols", f"{n}: damaged bytes")
+        raise sql.damage(f"{moment.members} members of symbols", f"{n}: damaged bytes")
     table = np.array([(row[2], row[1]) for row in rows], dtype=np.int64).reshape(-1, 2)
     table = table[np.lexsort((table[:, 1], table[:, 0]))]
     table.setflags(write=False)
@@ -149,7 +131,7 @@ def check_name(name: Any) -> str:
     """
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
-    check_text("a name", name, MAX_TEXT)
+    sql.check_text("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
     return name
@@ -165,13 +147,13 @@ def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], 
     return keys, new
 
 
-def stored_keys(connection: Database, names: Iterable[str]) -> dict[str, int]:
+def stored_keys(connection: sql.Database, names: Iterable[str]) -> dict[str, int]:
     """Return the name or id -> key of its symbol, of those that there are."""
     alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
     keys: dict[str, int] = {}
     for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
-        query = f"SELECT {column}, symbol.key {alive} AND {among(column)}"
-        keys |= dict(connection.execute(query, {"keys": listed(names)}))
+        query = f"SELECT {column}, symbol.key {alive} AND {sql.among(column)}"
+        keys |= dict(connection.execute(query, {"keys": sql.listed(names)}))
     return keys
 
 
@@ -204,7 +186,7 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
         about = records(store, shown.members)
         keys = {record["source"] for record in about if record["source"] is not None}
         with store.reading() as connection:
-            rows = select(connection, "source", among("id"), {"keys": listed(keys)})
+            rows = sql.select(connection, "source", sql.among("id"), {"keys": sql.listed(keys)})
         files = {row[0]: row[COLUMNS["source"].index("path")] for row in rows}
         people = groups(store, shown.members).tolist()
         for record, movement, person in zip(about, movements(store, shown.members), people, strict=True):
@@ -221,11 +203,5 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
                     "goal": movement.positions[-1].tolist(),
                 }
             )
-    return {
-        "id": shown.id,
-        "name": shown.name,
-        "description": shown.description,
-        "prototype": shown.prototype,
-        "parents": list(shown.parents),
-        "members": members,
-    }
+    plain = {name: getattr(shown, name) for name in ("id", "name", "description", "prototype")}
+    return plain | {"parents": list(shown.parents), "members": members}

@@ -137,21 +137,11 @@ _CHAPTER = __name__.rpartition(".storage.")[0]
 
 @dataclass(frozen=True)
 class Problem:
-    """One problem of a library.
+    """One problem of a library."""
 
-    Attributes
-    ----------
-    table : str
-        Empty for the file as a whole.
-    key : int, str or None
-        Key of the row: the movement, in the tables of samples, primitives and features.
-    text : str
-        What is wrong.
-    """
-
-    table: str
-    key: int | str | None
-    text: str
+    table: str  # empty for the file as a whole
+    key: int | str | None  # of the row: the movement, in the tables of samples, primitives and features
+    text: str  # what is wrong
 
     def __str__(self) -> str:
         return self.text

@@ -20,25 +20,18 @@ ORDERS = ("wxyz", "xyzw")
 class Channel(NamedTuple):
     """One quantity of a recording.
 
-    Attributes
-    ----------
-    name : str
-        The head of its column; of an orientation, what the heads of its four columns share.
-    kind : {"position", "angle", "orientation", "discrete"}
-        - ``"position"``: any quantity that moves on a line; learned as it is.
-        - ``"angle"``: a joint; learned without the jumps where it wraps.
-        - ``"orientation"``: a unit quaternion; learned as three coordinates, its rotation integrated along time [rad],
-          beside positions times 0.2 m.
-        - ``"discrete"``: a gripper or a button; kept as the steps that were recorded, and never learned.
-    columns : tuple of str
-        Heads of its columns: four of an orientation, one of the others. Side by side in what is recorded, in the order
-        of the file as far as `order` can say it.
-    unit : str or None
-        From the head, such as ``"deg"``; None if the file does not say.
-    order : str
-        Components of the columns of an orientation, ``"wxyz"`` or ``"xyzw"``; else empty.
-    period : float or None
-        What an angle wraps by if its unit does not say it, by the values that were recorded; 0 if it does not wrap.
+    Its kind is ``"position"``, any quantity that moves on a line, learned as it is; ``"angle"``, a joint, learned
+    without the jumps where it wraps; ``"orientation"``, a unit quaternion, learned as three coordinates, its rotation
+    integrated along time [rad], beside positions times 0.2 m; or ``"discrete"``, a gripper or a button, kept as the
+    steps that were recorded, and never learned.
+
+    - `name`: the head of its column; of an orientation, what the heads of its four columns share.
+    - `columns`: heads of its columns: four of an orientation, one of the others. Side by side in what is recorded, in
+      the order of the file as far as `order` can say it.
+    - `unit`: from the head, such as ``"deg"``; None if the file does not say.
+    - `order`: components of the columns of an orientation, ``"wxyz"`` or ``"xyzw"``; else empty.
+    - `period`: what an angle wraps by if its unit does not say it, by the values that were recorded; 0 if it does not
+      wrap.
     """
 
     name: str

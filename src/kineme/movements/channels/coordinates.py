@@ -73,7 +73,7 @@ def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> 
 def with_periods(channels: Channels, columns: Array) -> Channels:
     """Channels that say what their angles wrap by; where units do not, by the values of recorded columns (total, m)."""
     return tuple(
-        channel._replace(period=_finite(period_of_channel(channel, columns[:, rows.start])))
+        channel._replace(period=float(np.nan_to_num(period_of_channel(channel, columns[:, rows.start]), posinf=0.0)))
         if channel.kind == "angle" and period_by_unit(channel.unit) is None
         else channel
         for channel, rows in zip(channels, columns_of(channels), strict=True)
@@ -85,10 +85,6 @@ def period_of_channel(channel: Channel, angles: Array) -> float:
     if channel.period is None or period_by_unit(channel.unit) is not None:
         return period_of(angles, channel.unit)
     return channel.period or np.inf
-
-
-def _finite(period: float) -> float:
-    return period if np.isfinite(period) else 0.0
 
 
 def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:

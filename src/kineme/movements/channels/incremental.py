@@ -7,17 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.channels import coordinates
 from kineme.movements.channels.channel import Channel, Channels, recorded_names
-from kineme.movements.channels.coordinates import (
-    as_wxyz,
-    columns_of,
-    continuous_signs,
-    lever_of,
-    off_norm,
-    period_of_channel,
-    rotation_steps,
-    turns_of,
-)
 from kineme.validation import Array
 
 
@@ -34,20 +25,20 @@ class IncrementalCoordinates:
 
     def clear(self) -> None:
         """Forget the samples; the next one begins a movement."""
-        lever = lever_of(self._channels)
+        lever = coordinates.lever_of(self._channels)
         self._parts = [_part_of(channel, lever) for channel in self._channels]
 
     def usable(self, columns: Array) -> NDArray[np.bool_]:
         """Find the samples (k, m) that have quaternions of norm 1, (k,)."""
         good = np.ones(len(columns), dtype=bool)
         with np.errstate(over="ignore", invalid="ignore"):
-            for _, rows, _ in off_norm(columns, self._channels):
+            for _, rows, _ in coordinates.off_norm(columns, self._channels):
                 good[rows] = False
         return good
 
     def take(self, columns: Array) -> Array:
         """The coordinates (k, d) of the next k recorded samples (k, m)."""
-        parts = zip(self._parts, columns_of(self._channels), strict=True)
+        parts = zip(self._parts, coordinates.columns_of(self._channels), strict=True)
         return np.concatenate([take(columns[:, rows]) for take, rows in parts], axis=1)
 
 
@@ -64,7 +55,7 @@ class _Angle:
             return column
         before = self._before if len(self._before) else column[:1]
         steps = np.diff(column, axis=0, prepend=before)
-        turns = self._turns + np.cumsum(turns_of(steps, self._period), axis=0)
+        turns = self._turns + np.cumsum(coordinates.turns_of(steps, self._period), axis=0)
         self._before, self._turns = column[-1:].copy(), turns[-1:]
         return np.asarray(column - self._period * turns)
 
@@ -81,7 +72,9 @@ class _Orientation:
         if not len(columns):
             return np.empty((0, 3))
         block = np.concatenate((self._before, columns))  # steps are the same for either sign of its first
-        steps = rotation_steps(as_wxyz(continuous_signs(block, np.array([0, len(block)])), self._channel))
+        steps = coordinates.rotation_steps(
+            coordinates.as_wxyz(coordinates.continuous_signs(block, np.array([0, len(block)])), self._channel)
+        )
         turned = np.cumsum(np.concatenate((self._turned, steps)), axis=0)
         n_before = len(self._before)
         self._before, self._turned = columns[-1:].copy(), turned[-1:].copy()
@@ -93,7 +86,9 @@ def _part_of(channel: Channel, lever: float) -> Callable[[Array], Array]:
     if channel.kind == "orientation":
         return _Orientation(channel, lever).take
     if channel.kind == "angle":
-        period = period_of_channel(channel, np.full(1, np.inf))  # of one that says no period nothing is unwrapped
+        period = coordinates.period_of_channel(
+            channel, np.full(1, np.inf)
+        )  # of one that says no period nothing is unwrapped
         if np.isfinite(period):
             return _Angle(period).take
     n_coordinates = len(channel.coordinates)  # none of a discrete one

@@ -4,19 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.movements.preparation.pauses import (
-    EQUAL,
-    FEWEST,
-    GAP,
-    LAST_REST,
-    PAUSE,
-    RADIUS,
-    REST,
-    ROUNDS,
-    SAME_COUNT,
-    SHORTEST,
-    WINDOWS,
-)
+from kineme.movements.preparation import pauses
 from kineme.movements.trajectories._compiled import nth_smallest
 from kineme.runtime.compiled import jit
 
@@ -35,7 +23,7 @@ def fill_cut(samples, offsets, allowance, cut, ends):  # type: ignore[no-untyped
             own_times[j] = times[offsets[i] + j]
             for k in range(positions.shape[1]):
                 own[j, k] = positions[offsets[i] + j, k]
-        for _ in range(ROUNDS):
+        for _ in range(pauses.ROUNDS):
             if not _fill_shortened(own_times[:n], own[:n], allowance, steps[:n], moving[:n]):
                 break
             changes, elapsed, left = True, 0.0, 0
@@ -71,18 +59,18 @@ def _fill_shortened(times, positions, allowance, steps, moving):  # type: ignore
                 path += np.sqrt(_squared_distance(positions, j, j + 1))
     pace = motion / path if path > 0 else 0.0  # seconds for a unit of length
     if not gaps:
-        return _shorten_rests(steps, moving, scale, allowance * REST * reach * pace)
+        return _shorten_rests(steps, moving, scale, allowance * pauses.REST * reach * pace)
     changes = False
     before = 0.0
     for j in range(last):
         step = steps[j]
         if step > usual:
             length = np.sqrt(_squared_distance(positions, j, j + 1))
-            most = min(GAP * max(before, steps[j + 1], length * pace), PAUSE * scale)
-            changes |= step > EQUAL * max(usual, most)
+            most = min(pauses.GAP * max(before, steps[j + 1], length * pace), pauses.PAUSE * scale)
+            changes |= step > pauses.EQUAL * max(usual, most)
             steps[j] = min(step, max(usual, most))
         before = step
-    return _shorten_rests(steps, moving, scale, allowance * REST * reach * pace) or changes
+    return _shorten_rests(steps, moving, scale, allowance * pauses.REST * reach * pace) or changes
 
 
 @jit
@@ -93,12 +81,12 @@ def _fill_steps(times, steps):  # type: ignore[no-untyped-def]
         steps[j] = times[j + 1] - times[j]
         most = max(most, steps[j])
     steps[last] = 0.0
-    n_short, share = 0, most / GAP
+    n_short, share = 0, most / pauses.GAP
     for j in range(last):
         n_short += steps[j] < share  # a sum has no branch and becomes vector instructions
     if n_short <= last // 2:  # the median is at least that share of the longest step
         return np.inf
-    return GAP * nth_smallest(steps[:last].copy(), last // 2)
+    return pauses.GAP * nth_smallest(steps[:last].copy(), last // 2)
 
 
 @jit
@@ -108,7 +96,7 @@ def _may_have_gaps(steps, usual, motion):  # type: ignore[no-untyped-def]
         return False
     before = 0.0
     for j in range(len(steps) - 1):
-        if steps[j] > EQUAL * max(usual, min(GAP * max(before, steps[j + 1]), PAUSE * motion)):
+        if steps[j] > pauses.EQUAL * max(usual, min(pauses.GAP * max(before, steps[j + 1]), pauses.PAUSE * motion)):
             return True
         before = steps[j]
     return False
@@ -120,12 +108,12 @@ def _fill_resting(positions, moving):  # type: ignore[no-untyped-def]
 
     Its reach, whether it rests, and whether it rests anywhere but at its ends.
     """
-    n, window, size = len(positions), SHORTEST, 0.0
-    while 2 * WINDOWS * window <= n:
+    n, window, size = len(positions), pauses.SHORTEST, 0.0
+    while 2 * pauses.WINDOWS * window <= n:
         window *= 2
     for j in range(1, n):
         size = max(size, _squared_distance(positions, 0, j))
-    most_apart = RADIUS * RADIUS * size
+    most_apart = pauses.RADIUS * pauses.RADIUS * size
     until, n_rests, begin = 0, 0, 0  # the last sample and the first one of the newest rest
     for j in range(n - window + 1):  # the last sample of a window settles it for most windows
         last = _squared_distance(positions, j, j + window - 1)
@@ -150,12 +138,12 @@ def _shorten_rests(steps, moving, motion, most):  # type: ignore[no-untyped-def]
             total += steps[j]
             moving[j] = True
             j += 1
-        limit = PAUSE * motion if begin == 0 else min(PAUSE * motion, most)
+        limit = pauses.PAUSE * motion if begin == 0 else min(pauses.PAUSE * motion, most)
         if j == n - 1:
-            limit = LAST_REST * motion
-        if total > EQUAL * limit and limit > 0:
+            limit = pauses.LAST_REST * motion
+        if total > pauses.EQUAL * limit and limit > 0:
             changes, count, share = True, j - begin, limit / total
-            left = max(FEWEST, int(np.ceil(share * count - SAME_COUNT)))
+            left = max(pauses.FEWEST, int(np.ceil(share * count - pauses.SAME_COUNT)))
             for p in range(count):
                 steps[begin + p] *= share
                 moving[begin + p] = p == 0 or p * left // count != (p - 1) * left // count

@@ -39,9 +39,7 @@ class TrimRest:
     tolerance: float = 0.01
 
     def __post_init__(self) -> None:
-        check_number("tolerance", self.tolerance, least=0.0)
-        if self.tolerance >= 0.5:
-            raise SpecificationError(f"expected tolerance to be below 0.5, got {self.tolerance!r}")
+        check_number("tolerance", self.tolerance, least=0.0, below=0.5)
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements without their rest."""
@@ -80,7 +78,6 @@ class Step(Protocol):
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements after this step."""
-        ...
 
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:

@@ -116,14 +116,9 @@ def moving(motion: Motion, pieces: Rows, resolution: float) -> Rows:
 class Segmentation(MovementSequence):
     """Movements cut from one recording, and where: a sequence of `Trajectory`, taken wherever movements are expected.
 
-    Attributes
-    ----------
-    recording : Trajectory
-        The recording that was cut.
-    method : Segmenter
-        The method, with all its parameters.
-    rows : ndarray of shape (n, 2)
-        First sample of each movement, and one past its last.
+    - `recording`: the recording that was cut.
+    - `method`: the method, with all its parameters.
+    - `rows` (n, 2): first sample of each movement, and one past its last.
     """
 
     recording: Trajectory

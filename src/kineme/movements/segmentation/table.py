@@ -70,9 +70,7 @@ class Rest:
     min_movement: float | None = None
 
     def __post_init__(self) -> None:
-        check_number("speed", self.speed, above=0.0)
-        if self.speed >= 0.5:
-            raise SpecificationError(f"expected speed to be a share of the peak speed below 0.5, got {self.speed!r}")
+        check_number("speed", self.speed, above=0.0, below=0.5)
         for name in ("min_rest", "min_movement"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), least=0.0)
@@ -109,7 +107,6 @@ class Rest:
         return bouts, lasting >= least
 
     def _without_pauses(self, bouts: Rows, motion: Motion) -> Rows:
-        """Bouts merged across pauses."""
         if self.min_rest is not None:
             return merge_across(bouts, motion.times, self.min_rest)
         for _ in range(_ROUNDS):
@@ -153,9 +150,7 @@ class SpeedMinima:
 
     def __post_init__(self) -> None:
         for name in ("depth", "span"):
-            check_number(name, getattr(self, name), above=0.0)
-            if getattr(self, name) >= 1:
-                raise SpecificationError(f"expected {name} to be a share below 1, got {getattr(self, name)!r}")
+            check_number(name, getattr(self, name), above=0.0, below=1.0)
         if self.turn is not None:
             check_number("turn", self.turn, above=0.0)
             if self.turn >= np.pi:
@@ -299,15 +294,12 @@ class Segmenter(Protocol):
     @property
     def resolution(self) -> float:
         """Share of the peak speed that has to be told from rest."""
-        ...
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, none at the ends."""
-        ...
 
     def pieces(self, motion: Motion) -> Rows:
         """The piece of each movement, rows (n, 2), disjoint and in order; `segment` narrows them to their motion."""
-        ...
 
 
 #: Name -> method.

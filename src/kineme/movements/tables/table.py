@@ -77,7 +77,10 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
             raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
-    people = None if roles.person is None else _people(table.columns[roles.person], codes)
+    people: list[str | None] | None = None
+    if roles.person is not None:  # who showed the first sample of each movement
+        names = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
+        people = [str(name) or None for name in names.tolist()]
     rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
     if rows is not None:
         positions, times, codes = positions[rows], times[rows], codes[rows]
@@ -89,7 +92,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         f"{table.maker} {kind}".strip(),
         "long" if roles.movement or roles.label is not None or table.segments is not None else "wide",
         distinct([heads[k] for k in roles.positions]),
-        _time_heads(heads, roles),
+        None if roles.time is None else " + ".join(heads[k] for k in (roles.time, roles.nanoseconds) if k is not None),
         units,
         units_from,
         tuple(heads[k] for k in roles.movement),
@@ -100,12 +103,6 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
-
-
-def _people(column: NDArray[Any], codes: NDArray[np.intp]) -> list[str | None]:
-    """Return the person who showed each movement."""
-    _, firsts = np.unique(codes, return_index=True)
-    return [str(name) or None for name in column[firsts].tolist()]
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
@@ -143,13 +140,6 @@ def _unit_by_clocks(table: Table, roles: Roles) -> tuple[str, str] | None:
 def _in_turns(roles: Roles) -> bool:
     """Tell whether no column tells movements apart but labels and people, which change from time to time."""
     return not roles.movement or roles.movement == (roles.person,)
-
-
-def _time_heads(heads: Sequence[str], roles: Roles) -> str | None:
-    """The column of times, or the two whose sum they are."""
-    if roles.time is None or roles.nanoseconds is None:
-        return None if roles.time is None else heads[roles.time]
-    return f"{heads[roles.time]} + {heads[roles.nanoseconds]}"
 
 
 def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], list[str], list[str | None]]:

@@ -410,7 +410,6 @@ class MovementSequence(Presented):
         @property
         def demonstrations(self) -> Demonstrations:
             """The movements."""
-            ...
 
     @property
     def _samples(self) -> Samples:

@@ -68,7 +68,6 @@ def _draw(figure: Figure | SubFigure, drawn: _Drawn) -> None:
 
 
 def _key(drawn: _Drawn) -> list[Any]:
-    """Entries of the legend."""
     ends = (("start", _START), ("end", _END)) if len(drawn.axis_names) in (2, 3) else ()
     return drawn.key + [
         _entry(name, GRAY, marker=marker, markersize=size, linestyle="none") for name, (marker, size) in ends

@@ -116,7 +116,6 @@ class HasDemonstrations(Protocol):
     @property
     def demonstrations(self) -> Sequence[Trajectory]:
         """The movements, as `Demonstrations`."""
-        ...
 
 
 #: One movement: a `Trajectory`, or positions of shape (T, d) or (T,), evenly sampled over one second.

@@ -38,17 +38,10 @@ _APART = 0.05  # between two postures that are looked at no joint moves farther 
 class JointTrajectory:
     """Joint positions of one arm over time, T samples of n joints.
 
-    Attributes
-    ----------
-    joints : tuple of str
-    times : ndarray of shape (T,)
-        From 0 [s].
-    positions, velocities, accelerations : ndarray of shape (T, n)
-        [rad, m], per second, per second squared.
-    steps : dict of str to ndarray of shape (T,)
-        Channels beside the joints, such as a gripper: the value that holds from each sample on.
-    units : tuple of n str
-        "rad", or "m" of joints that slide; by default "rad".
+    - `times` (T,): from 0 [s].
+    - `positions`, `velocities`, `accelerations` (T, n): [rad, m], per second, per second squared.
+    - `steps`: channel beside the joints, such as a gripper -> value (T,) that holds from each sample on.
+    - `units`: "rad", or "m" of joints that slide; by default "rad".
     """
 
     joints: tuple[str, ...]

@@ -69,18 +69,6 @@ def preflight(
     TrajectoryError
         A trajectory of other joints, of numbers that are not finite, or whose times do not increase.
     """
-    _check_numbers(robot, trajectory)
-    times = dense_times(robot, trajectory)
-    dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
-    state = along(robot, dense)
-    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
-    checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
-    if path is not None:
-        checks += tracking(robot, trajectory, path, follow, (times, state))
-    return Preflight(tuple(checks), tuple(_unchecked(robot)))
-
-
-def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
     shape = (max(2, len(trajectory)), robot.n_joints)
     arrays = {name: getattr(trajectory, name) for name in ("positions", "velocities", "accelerations")}
     for name, values in arrays.items():
@@ -89,6 +77,14 @@ def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
     finite = all(np.isfinite(values).all() for values in (trajectory.times, *arrays.values()))
     if not finite or not np.all(np.diff(trajectory.times) > 0):
         raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
+    times = dense_times(robot, trajectory)
+    dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
+    state = along(robot, dense)
+    checks = [*_at_limits(robot, trajectory), *_torques(robot, dense, state)]
+    checks += [*between_samples(robot, trajectory), *_of_the_arm(robot, trajectory, dense, state)]
+    if path is not None:
+        checks += tracking(robot, trajectory, path, follow, (times, state))
+    return Preflight(tuple(checks), tuple(_unchecked(robot)))
 
 
 def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
@@ -207,7 +203,8 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     gripper. What changes in motion as it was generated passes; the fastest of these is said, without a limit.
     """
     name, sent = generated.name, trajectory.steps[generated.name]
-    before, now = _changes(generated.values), _changes(sent)
+    # The samples from which another value holds.
+    before, now = (np.flatnonzero(np.diff(values)) + 1 for values in (generated.values, sent))
     if not np.array_equal(generated.values[[0, *before]], sent[[0, *now]]):
         return Check("steps", name, 0.0, len(now), len(before), "changes", False, math.inf)
     if len(now) == 0:
@@ -221,11 +218,6 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     limit, unit = (math.nan, "of the velocity limit, moving") if moving else (_STANDING, "of the velocity limit")
     at, slower = float(trajectory.times[now[worst]]), 1.0 if passed else math.inf
     return Check("steps", name, at, float(shares[worst]), limit, unit, passed, slower)
-
-
-def _changes(values: Array) -> NDArray[np.intp]:
-    """Indices of the samples from which another value holds."""
-    return np.flatnonzero(np.diff(values)) + 1
 
 
 class Check(NamedTuple):
@@ -245,12 +237,9 @@ class Check(NamedTuple):
 class Preflight:
     """All checks of one trajectory.
 
-    Attributes
-    ----------
-    checks : tuple of Check
-        For velocity, acceleration, position and torque the worst instant of each joint, then the arm as a whole.
-    unchecked : tuple of str
-        What could not be checked and why, one sentence each.
+    - `checks`: for velocity, acceleration, position and torque the worst instant of each joint, then the arm as a
+      whole.
+    - `unchecked`: what could not be checked and why, one sentence each.
     """
 
     checks: tuple[Check, ...]

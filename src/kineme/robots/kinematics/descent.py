@@ -303,10 +303,7 @@ class InverseKinematics:
     def reset(self, q: Array) -> None:
         """Start from joint positions q (n,).
 
-        Raises
-        ------
-        SpecificationError
-            Joints outside their limits.
+        Raises `SpecificationError`: joints outside their limits.
         """
         from pink import Configuration
 

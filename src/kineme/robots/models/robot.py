@@ -291,28 +291,15 @@ _ROUNDING = 1e-6  # so far outside a limit a joint still counts as at it [rad, m
 class Robot:
     """An arm, made by `load`. Arrays have one entry for each of its n joints between the root and the tip.
 
-    Attributes
-    ----------
-    name : str
-    joints : tuple of str
-    units : tuple of str
-        "rad", or "m" of joints that slide.
-    tip : str
-        The frame that follows the movement.
-    lower, upper : ndarray of shape (n,)
-        Limits of position [rad, m].
-    velocity, acceleration : ndarray of shape (n,)
-        Limits, per second and per second squared.
-    effort : ndarray of shape (n,)
-        Largest torque or force; nan where it is not known.
-    rest : ndarray of shape (n,)
-        The posture from which movements are approached.
-    assumed : tuple of str
-        What the file does not say and what is taken instead, one sentence each.
-    source : Path
-        The URDF file.
-    model, geometry : pinocchio.Model, pinocchio.GeometryModel
-        Of these joints alone; all others are locked.
+    - `units`: "rad", or "m" of joints that slide.
+    - `tip`: the frame that follows the movement.
+    - `lower`, `upper` (n,): limits of position [rad, m].
+    - `velocity`, `acceleration` (n,): limits, per second and per second squared.
+    - `effort` (n,): largest torque or force; nan where it is not known.
+    - `rest` (n,): the posture from which movements are approached.
+    - `assumed`: what the file does not say and what is taken instead, one sentence each.
+    - `source`: the URDF file.
+    - `model`, `geometry`: of these joints alone; all others are locked.
     """
 
     name: str

@@ -15,7 +15,7 @@ from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import Scales, roles_of, scales_of
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array, as_point
 
 
 class GeneratedMovement(NamedTuple):
@@ -59,7 +59,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
             f"expected two or three positions of the tip, got {n} among {', '.join(learned.columns)}; choose columns, "
             "or say that it is a movement of the joints (joints=True, --joints)"
         )
-    begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
+    frame = joints.joints if joints else "xyz"
+    begin, end = (None if p is None else as_point(name, p, frame) for name, p in (("at", at), ("goal", goal)))
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     if begin is not None and end is not None and len(axes) < len(end):
         across = ({0, 1, 2} - {*axes}).pop()
@@ -73,9 +74,9 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     start = shown[0, roles.positions]
     scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
     origin = start * scales.size + scales.offset if begin is None else begin[axes]
-    way = _point(displacement, "displacement", n)
-    if way is None and end is not None:
-        way = (end[axes] - origin) / scales.size
+    way = None if end is None else (end[axes] - origin) / scales.size
+    if displacement is not None:
+        way = as_point("displacement", displacement, [learned.columns[k] for k in roles.positions])
     target = None
     if way is not None:  # positions as asked for, what moves besides as it is demonstrated
         target = shown[-1].copy()
@@ -97,12 +98,3 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         for columns in (roles.discrete, roles.continuous)
     )
     return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous)
-
-
-def _point(point: ArrayLike | None, name: str, n: int) -> Array | None:
-    if point is None:
-        return None
-    values = as_numbers(point, name)
-    if values.shape != (n,) or not np.isfinite(values).all():
-        raise SpecificationError(f"expected {name} as {n} finite numbers, got {np.asarray(point).tolist()}")
-    return values

@@ -91,10 +91,6 @@ def move(  # noqa: PLR0913 - one parameter per option
     force : bool, default False
         Return a trajectory that did not pass its checks.
 
-    Returns
-    -------
-    RobotMovement
-
     Raises
     ------
     InfeasibleError

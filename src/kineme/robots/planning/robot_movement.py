@@ -54,19 +54,11 @@ _LEAST_CHANGE = 0.005  # of a change of the duration, which is said to three dig
 class RobotMovement:
     """The result of `move`: a movement on an arm, with its checks.
 
-    Attributes
-    ----------
-    robot : Robot
-    trajectory : JointTrajectory
-        What is sent to the arm: the approach from the posture where it stands, then the movement.
-    path : TaskPath or None
-        What the tip follows, at the samples of the movement; None of a movement of the joints.
-    preflight : Preflight
-        All checks of `trajectory`.
-    begins : float
-        When the approach is over and the movement begins [s].
-    factor : float
-        How many times as long the movement takes as it was generated.
+    - `trajectory`: what is sent to the arm: the approach from the posture where it stands, then the movement.
+    - `path`: what the tip follows, at the samples of the movement; None of a movement of the joints.
+    - `preflight`: all checks of `trajectory`.
+    - `begins`: when the approach is over and the movement begins [s].
+    - `factor`: how many times as long the movement takes as it was generated.
     """
 
     robot: Robot

@@ -69,10 +69,6 @@ def write_view(path: str | Path, movement: RobotMovement) -> Path:
     movement : RobotMovement
         From `move`.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     DataError

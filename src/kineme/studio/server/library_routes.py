@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
@@ -11,8 +12,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
-from kineme.anchoring.scaling import classical_scaling
-from kineme.anchoring.space import conceptual_space
+from kineme.anchoring.space import classical_scaling, conceptual_space
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.io.writing.write_movement import WRITERS
 from kineme.library.members import described
@@ -22,7 +22,6 @@ from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
 from kineme.library.storage.store import Version
 from kineme.library.storage.undo import can_undo
 from kineme.reporting.text import counted, first_names, printable, shortened
-from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.records import ChannelOut, MovementKey, Points, numbers, thumbnail
 from kineme.studio.server.refusals import ConflictError
@@ -233,8 +232,13 @@ def library(request: Request, studio: Reads) -> Response:
 
     def document() -> tuple[bytes, str]:
         """Make the answer of one version, and a tag that is another one when the answer is."""
-        with collector_paused():  # 10,000 symbols are 640,000 lists
+        collects = gc.isenabled()
+        gc.disable()  # 10,000 symbols are 640,000 lists, and a search for garbage would go through all again and again
+        try:
             body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
+        finally:
+            if collects:
+                gc.enable()
         return body, f'"{sha256(body).hexdigest()[:20]}"'
 
     body, tag = studio.cached("library", document)
@@ -344,7 +348,6 @@ def _library(studio: Studio) -> dict[str, Any]:
 
 
 def _listed(studio: Studio, ids: read.Ids) -> list[dict[str, Any]]:
-    """Movements with thumbnails."""
     if not len(ids):
         return []
     store, symbol_of = studio.library.store, studio.view().symbol_of

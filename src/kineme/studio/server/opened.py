@@ -54,7 +54,6 @@ class Lane(NamedTuple):
 
 
 def _lanes(annotations: Iterable[Annotation], corrected: bool) -> dict[Movement, Lane]:
-    """Return the annotations of each movement."""
     notes: dict[Movement, list[Annotation]] = {}
     for note in annotations:
         notes.setdefault((note.recording, note.place), []).append(note)
