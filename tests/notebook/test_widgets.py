@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.errors import DataError, SpecificationError
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 
 pytest.importorskip("anywidget", reason="the extra notebook is not installed")
 from widget_samples import demonstrations
@@ -61,6 +61,21 @@ def test_a_primitive_is_where_it_was_learned_until_it_is_dragged():
     assert Move(kineme.DMP().learn(demonstrations()[[0, 3]])).moved["name"] == "CShape"
     with pytest.raises(DataError, match="expected a movement in the cell"):
         _ = Draw().goal
+
+
+def test_a_movement_is_placed_from_python():
+    move = Move(kineme.DMP().learn(demonstrations()[[0, 3]]))
+    via = [[0.5, (move.path.positions[100] + [3.0, 1.0]).tolist()]]
+    move.moved = move.moved | {"name": "GShape", "via": via}
+    move.place(goal=[5.0, 6.0], start=(-20, 1))
+    assert (move.goal.tolist(), move.start.tolist(), move.moved["via"]) == ([5.0, 6.0], [-20.0, 1.0], via)
+    path, primitive = move.path, move.primitive
+    expected = primitive.rollout(start=[-20, 1], goal=[5, 6], via=[(0.5, via[0][1])], n_samples=len(path))
+    np.testing.assert_allclose(path.positions, expected.positions[0])
+    before = move.moved
+    with pytest.raises(TrajectoryError, match="goal of shape"):
+        move.place(goal=[1.0, 2.0, 3.0])
+    assert move.moved == before
 
 
 def test_what_cannot_be_drawn_is_refused():

@@ -107,6 +107,22 @@ def test_a_goal_is_dragged_and_read_in_python(show):
     assert again.widget.goal[0] > primitives.goals[1, 0] + 1
 
 
+def test_a_goal_that_python_sets_is_shown(show):
+    cell = show(Move(kineme.DMP().learn(demonstrations()[[0, 3]])))
+    cell.frame.get_by_role("button", name="GShape").click()
+    wait_until(cell.page, "model.get('moved').name === 'GShape'")
+    cell.take()
+    move = cell.widget
+    move.place(goal=move.goal + np.array([4.0, -3.0]))
+    cell.page.evaluate("moved => model.set('moved', moved)", move.moved)  # as the kernel sends it
+    wait_until(cell.frame, "goal => String(kineme.state.moving.goal) === String(goal)", move.moved["goal"])
+    assert cell.frame.evaluate("kineme.state.moving.name") == "GShape"
+    wait_until(cell.page, "goal => String(window.saved.moved.goal) === String(goal)", move.moved["goal"])
+    cell.take()
+    expected = move.primitive.rollout(goal=move.goal, n_samples=len(move.path)).positions[0]
+    np.testing.assert_allclose(move.path.positions, expected, atol=1e-4 * np.ptp(expected))
+
+
 def test_what_is_drawn_is_as_light_as_a_dark_notebook_needs(show):
     """Colors that were taken before the notebook said that it is dark are taken anew."""
     cell = show(Draw(), dark=True, color_scheme="light")

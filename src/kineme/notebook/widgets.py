@@ -11,6 +11,7 @@ from typing import Any
 import anywidget
 import numpy as np
 import traitlets
+from numpy.typing import ArrayLike
 
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.errors import DataError, SpecificationError
@@ -188,3 +189,15 @@ class Move(_Page):
     def primitive(self) -> Primitives:
         """The primitive that is chosen in the cell."""
         return self.primitives[self._names.index(self.moved["name"])]
+
+    def place(self, *, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> None:
+        """Put the start or the goal (d,) elsewhere, as a hand does in the cell, which shows it; via points stay.
+
+        Raises what `Primitives.rollout` raises, and then changes nothing.
+        """
+        start, goal = (self.start if start is None else start), (self.goal if goal is None else goal)
+        via = list(map(tuple, self.moved["via"])) or None
+        rollout = self.primitive.rollout(start=start, goal=goal, via=via, n_samples=N_POINTS)
+        place = {"start": np.ravel(start).astype(float), "goal": np.ravel(goal).astype(float)}
+        place |= {"times": rollout.times[0], "positions": rollout.positions[0]}
+        self.moved = self.moved | {name: array.tolist() for name, array in place.items()}

@@ -28,7 +28,7 @@ const panel = new AnswerPanel({
     state.drags ? "Drag its start, its goal, or the path; or draw another." : "Draw another, or drag this one.",
 });
 const state = { ...NOTHING, drags: false, held: null }; // drags: another press does not draw
-const symbols = createSymbols(backend.symbols(), header.view, choose);
+const symbols = createSymbols(backend.symbols(), header.view, chosen);
 const following = backend.follow((message) => {
   state.live = message.state ?? state.live;
   show();
@@ -106,19 +106,23 @@ function tellMoved() {
 }
 
 /** A known movement, or a drawn one, that can be moved; the note says why there is none. */
-function movable(name, what, place) {
+function movable(name, what, { via = [], ...place }) {
   try {
     const moving = createMoving(backend, name, what, place);
     const formulation = byId("formulation").value || header.movements.formulation;
-    return { moving, note: moving.update({ formulation }) ?? "" };
+    return { moving, note: moving.update({ formulation, via }) ?? "" };
   } catch (error) {
     return { moving: null, note: error.message };
   }
 }
 
-function choose(name) {
-  become({ drags: true, ...movable(name, { symbol: name }, placed(backend, name, box)) });
+function choose(name, place = placed(backend, name, box)) {
+  become({ drags: true, ...movable(name, { symbol: name }, place) });
   symbols.select(name);
+}
+
+function chosen(name) {
+  choose(name);
   // In a narrow window what was chosen is above the list of what can be chosen.
   document.querySelector(".answer").scrollIntoView({ block: "nearest" });
 }
@@ -259,11 +263,11 @@ function start() {
       for (const picture of [stage, symbols]) picture.turn(angles);
     };
   become({});
-  // Primitives alone recognize nothing; what moves there is where it was before the cell was shown again.
-  hearNotebook(({ moved: { name, ...place } }) => {
-    if (header.early || state.moving) return;
-    choose(name);
-    update(place);
+  // Primitives alone recognize nothing; what moves there is where Python or the cell put it last.
+  hearNotebook(({ moved: { name, start, goal, via } }) => {
+    if (header.early || state.held) return;
+    const ends = (moving) => JSON.stringify([moving?.name, moving?.start, moving?.goal, moving?.via]);
+    if (ends(state.moving) !== ends({ name, start, goal, via })) choose(name, { start, goal, via });
   });
   // What is drawn first should not wait for what is made once.
   if (header.early) window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));

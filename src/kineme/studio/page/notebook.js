@@ -14,22 +14,27 @@ export default {
       frame.style.cssText = `width: 100%; border: 0; color-scheme: ${dark ? "dark" : "light"}`;
       frame.contentWindow?.postMessage({ dark, drawn: model.get("drawn"), moved: model.get("moved") }, "*");
     };
+    let heard = null; // what moved in the page, which it need not be told
     const hear = ({ source, data }) => {
       if (source !== frame.contentWindow) return;
       if (data.height) frame.height = data.height;
+      heard = data.moved ?? heard;
       for (const name of ["drawn", "moved"]) if (data[name]) model.set(name, data[name]);
       model.save_changes();
     };
+    const tellMoved = () => model.get("moved") !== heard && tell();
     const looks = new MutationObserver(tell);
     for (const element of [document.documentElement, document.body]) looks.observe(element, { attributes: true });
     window.addEventListener("message", hear);
     frame.addEventListener("load", tell);
     model.on("change:drawn", tell);
+    model.on("change:moved", tellMoved);
     el.append(frame);
     return () => {
       looks.disconnect();
       window.removeEventListener("message", hear);
       model.off("change:drawn", tell);
+      model.off("change:moved", tellMoved);
     };
   },
 };
