@@ -327,6 +327,9 @@ def test_signals_under_way_are_recognized_as_in_python(signal, monkeypatch):
     recognizer = kineme.Recognizer(how).fit(draw_shapes([2, 3, 2], 1, seed=4))
     fresh = draw_shapes([1] * 3, 1, seed=4, spread=0.3)
     assert compare_states(states_of(recognizer, list(fresh))) <= 5 * SIMILAR
+    held = interrupted(fresh)  # rests of signals stay in detail
+    assert compare_answers(answers_of(recognizer, held)) <= 2 * SIMILAR
+    assert compare_states(states_of(recognizer, list(held))) <= 5 * SIMILAR
 
 
 @pytest.mark.parametrize(

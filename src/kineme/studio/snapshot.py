@@ -163,6 +163,8 @@ def pause_rule(allowance: float = 1.0) -> dict[str, float]:
 def _detail_rule(how: Comparison, details: Shapes) -> dict[str, Any]:
     """Write how movements are compared in detail."""
     own = _fields(how.specification, "upright") | {"cutoff": how.specification.detailed_cutoff}
+    if how.specification.are_signals(how.n_dims):
+        own["pauses"] = pause_rule() | {"radius": -1.0}  # nothing is so near to itself: rests stay
     positions = _fields(how.specification.detailed_positions, "arc_share", "n_points", "signal")
     return pair_rule(details) | own | {"positions": positions}
 

@@ -266,17 +266,18 @@ function angle(vectors, p, q, d) {
  */
 export function describeMovement(movement, how, arrays) {
   const unpaused = withoutPauses(movement, how.pauses);
-  const smooth = (cutoff) => evenPath(unpaused, cutoff, N_POINTS);
+  const smooth = (cutoff, rule) => evenPath(rule ? withoutPauses(movement, rule) : unpaused, cutoff, N_POINTS);
   return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 
 /**
- * A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less.
+ * A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less, and its
+ * pauses may be cut by a rule of its own.
  * @param {Object} how
- * @param {(cutoff: number|null) => Float64Array} smooth
+ * @param {(cutoff: number|null, rule?: import("./pauses.js").PauseRule) => Float64Array} smooth
  */
 export function smoothly(how, smooth) {
-  return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff) };
+  return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff, how.details.pauses) };
 }
 
 /** The same of a path, smoothed both ways, relative to a first position. @returns {Stored} */
