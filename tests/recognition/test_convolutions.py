@@ -110,7 +110,7 @@ def test_an_explanation_says_that_the_kernels_chose_its_examples():
     recognizer = kineme.Recognizer().fit(draw_trembles(16, seed=1))
     explained = recognizer.recognize(draw_trembles(3, seed=5))[4].explain()
     assert explained.by_convolutions
-    assert "(ranked by random convolutions; example and shares are those of the kernels)" in explained.in_words
+    assert "(ranked with random convolutions; example and shares are those of the kernels)" in explained.in_words
     assert "random convolutions" in explained.plot().get_suptitle()
     assert len(repr(explained)) < 300
     assert repr(recognizer.classifier_).startswith("Convolutions(sharpness=")

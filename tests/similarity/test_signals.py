@@ -106,7 +106,9 @@ def test_signals_keep_their_rests_in_detail_and_nothing_else_does(choice, cutoff
     signals = describe([briefly, long], ComparisonSpecification(cutoff=cutoff))
     apart = squared_distances(signals, signals)[:, 0, 1]
     assert apart[5] > 0.1 > 10.0 * apart[2]
-    in_the_plane = [kineme.Trajectory(one.times, np.hstack((one.positions, one.positions**2))) for one in (briefly, long)]
+    in_the_plane = [
+        kineme.Trajectory(one.times, np.hstack((one.positions, one.positions**2))) for one in (briefly, long)
+    ]
     for paths, how in ((in_the_plane, DEFAULT_REPRESENTATIONS), ([briefly, long], AS_PATHS)):
         described = describe(paths, ComparisonSpecification(how, cutoff=cutoff))
         assert squared_distances(described, described)[5, 0, 1] < 0.01
