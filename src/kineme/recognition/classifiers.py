@@ -27,6 +27,8 @@ _COMPARED = 500  # demonstrations by which the kernels are judged, at most
 #: Share of demonstrations left out that the kernels recognize from which on nothing else is tried, and by how much
 #: more the convolutions must recognize: on five of seven sets of people's movements the kernels are ahead.
 _ENOUGH, _AHEAD = 0.97, 0.01
+#: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
+PROFILED = 0.25
 _NO_PROFILE = 1e-9  # length of features that are all as their center
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
@@ -66,7 +68,7 @@ class NearestEach(Classifier):
 
 @dataclass(frozen=True, eq=False)
 class NearestProfiled(NearestEach):
-    """Half of the score is that of `NearestEach`, half a kernel on the profile of a movement, of its nearest reference.
+    """The score is that of `NearestEach`, and a share of a kernel on profiles, that of the nearest reference.
 
     The profile is the features of random convolutions, `convolutions.transform`, centered at the mean of the references
     and of length 1: it tells which details a movement has, wherever they are. So it is for what is never rotated, and
@@ -90,7 +92,7 @@ class NearestProfiled(NearestEach):
         cosines = profiles_of(compared.described, self.kernels, self.center) @ self.profiles.T
         nearest = np.maximum.reduceat(cosines, compared.references.first, axis=1)
         by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
-        return np.asarray(np.logaddexp(compared.nearest_each, by_profile) - np.log(2.0))
+        return np.logaddexp(np.log(1.0 - PROFILED) + compared.nearest_each, np.log(PROFILED) + by_profile)
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
