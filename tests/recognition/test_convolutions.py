@@ -8,7 +8,7 @@ from sklearn.linear_model import Ridge, RidgeCV
 
 import kineme
 from kineme.errors import SpecificationError
-from kineme.recognition.classifiers import NearestEach
+from kineme.recognition.classifiers import NearestEach, NearestProfiled, profiles_of
 from kineme.recognition.convolutions import _ALPHAS, Convolutions, _weights, fit_kernels, left_out_values, transform
 from kineme.similarity.specification import ROW_REPRESENTATIONS
 from kineme.studio.snapshot import snapshot_of_recognizer
@@ -110,7 +110,7 @@ def test_an_explanation_says_that_the_kernels_chose_its_examples():
     recognizer = kineme.Recognizer().fit(draw_trembles(16, seed=1))
     explained = recognizer.recognize(draw_trembles(3, seed=5))[4].explain()
     assert explained.by_convolutions
-    assert "(ranked by random convolutions; example and shares are those of the kernels)" in explained.in_words
+    assert "(ranked with random convolutions; example and shares are those of the kernels)" in explained.in_words
     assert "random convolutions" in explained.plot().get_suptitle()
     assert len(repr(explained)) < 300
     assert repr(recognizer.classifier_).startswith("Convolutions(sharpness=")
@@ -133,6 +133,90 @@ def test_the_number_of_columns_does_not_matter(n_dims):
     columns = [[0], [0, 1, 0], [0, 1, 1, 0, 1]][(1, 3, 5).index(n_dims)]
     demos = kineme.Demonstrations.from_arrays([demo.positions[:, columns] for demo in plane], plane.labels)
     assert isinstance(kineme.Recognizer().fit(demos).classifier_, Convolutions)
+
+
+def columns_of(demos, n_dims):
+    """The trembles in so many columns."""
+    chosen = np.arange(n_dims) % 2
+    return kineme.Demonstrations.from_arrays([demo.positions[:, chosen] for demo in demos], demos.labels)
+
+
+def draw_orders(each, seed, noise=0.1, n_classes=5):
+    """Signals of three strokes of the class's own, in any order."""
+    rng, u = np.random.default_rng(seed), np.linspace(0, 1, 50)[:, None]
+    strokes = np.random.default_rng(1).normal(size=(n_classes, 3, 4, 1))
+    waves, arrays, labels = np.sin(np.pi * u * np.arange(1, 5)), [], []
+    for label, own in enumerate(strokes):
+        for _ in range(each):
+            arrays.append(
+                np.vstack([waves @ (part + noise * rng.normal(size=part.shape)) for part in rng.permutation(own)])
+            )
+            labels.append(str(label))
+    return kineme.Demonstrations.from_arrays(arrays, labels)
+
+
+def test_profiles_recognize_what_is_made_in_another_order():
+    shares = []
+    for seed in range(6):
+        shown, asked = (draw_orders(each, 100 * each + seed) for each in (1, 6))
+        profiled, alone = kineme.Recognizer().fit(shown), kineme.Recognizer(classifier="nearest-each").fit(shown)
+        shares.append((profiled.score(asked), alone.score(asked)))
+    profiled, alone = np.mean(shares, axis=0)
+    assert profiled > alone + 0.08
+
+
+def test_profiles_are_a_quarter_of_the_score():
+    shown, asked = (columns_of(draw_trembles(each, seed=each), 5) for each in (3, 4))
+    recognizer = kineme.Recognizer().fit(shown)
+    kernels = kineme.Recognizer(classifier="nearest-each").fit(shown).decision_function(asked)
+    classifier, labels = recognizer.classifier_, np.asarray(recognizer.demonstrations_.labels)
+    profiles = profiles_of(recognizer.describe(asked), classifier.kernels, classifier.center)
+    np.testing.assert_allclose(np.linalg.norm(profiles, axis=1), 1.0)
+    squares = ((profiles[:, None] - classifier.profiles) ** 2).sum(axis=2)
+    nearest = np.stack([squares[:, labels == label].min(axis=1) for label in recognizer.classes_], axis=1)
+    expected = np.log(0.75 * np.exp(kernels) + 0.25 * np.exp(-nearest / (2 * classifier.width**2)))
+    np.testing.assert_allclose(recognizer.decision_function(asked), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_with_profiles_one_class_is_named_everywhere():
+    shown, asked = (columns_of(draw_trembles(each, seed=10 + each), 1) for each in (2, 5))
+    recognizer = kineme.Recognizer().fit(shown)
+    predicted, probabilities = recognizer.predict(asked), recognizer.predict_proba(asked)
+    np.testing.assert_array_equal(recognizer.classes_[probabilities.argmax(axis=1)], predicted)
+    for answer, label, row in zip(recognizer.recognize(asked), predicted, probabilities, strict=True):
+        assert answer.ranked[0] == label
+        assert answer.label in (label, None)
+        np.testing.assert_allclose([answer.probabilities[name] for name in recognizer.classes_], row)
+    explained = recognizer.recognize(asked[0]).explain()
+    assert explained.by_convolutions
+    with pytest.raises(SpecificationError, match="got convolutions, which the page does not have"):
+        snapshot_of_recognizer(recognizer)
+
+
+@pytest.mark.parametrize(
+    ("n_dims", "options"),
+    [
+        (2, {}),
+        (2, {"max_angle": 0.0}),
+        (3, {}),
+        (4, {"points": 2}),
+        (5, {"mean": "geometric"}),
+        (5, {"scale": "none"}),
+        (1, {"translation": False}),
+        (1, {"classifier": "nearest-each"}),
+    ],
+    ids=str,
+)
+def test_what_is_rotated_placed_or_not_averaged_has_no_profiles(n_dims, options):
+    recognizer = kineme.Recognizer(**options).fit(columns_of(draw_trembles(2, seed=3), n_dims))
+    assert not isinstance(recognizer.classifier_, NearestProfiled)
+
+
+def test_one_class_or_copies_have_no_profiles():
+    shown = columns_of(draw_trembles(2, seed=4), 1)
+    assert not isinstance(kineme.Recognizer().fit(shown[:2]).classifier_, NearestProfiled)
+    copies = [shown[0], shown[0], shown[0], shown[1]]
+    assert not isinstance(kineme.Recognizer().fit(copies, list("aabb")).classifier_, NearestProfiled)
 
 
 def test_without_details_there_are_none_that_queries_would_lack():

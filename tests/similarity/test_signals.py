@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import kineme
 from kineme import Demonstrations, Recognizer
 from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import ElasticSpec, pair_distances, shapes_of
@@ -28,15 +29,15 @@ def _segments(values, n):
     return (ends[1:] + ends[:-1]) / 2.0, slopes / np.sqrt(np.mean(slopes**2))
 
 
-def _warped(a, b, band):
-    """Dynamic time warping of values and slopes, as in textbooks, per segment."""
+def _warped(a, b, band, weight):
+    """Dynamic time warping of values and slopes, as in textbooks, per segment; `weight` is that of values."""
     (x, slope_x), (y, slope_y) = a, b
     n = len(x)
     least = np.full((n + 1, n + 1), np.inf)
     least[0, 0] = 0.0
     for p in range(n):
         for q in range(max(0, p - band), min(n, p + band + 1)):
-            cost = (slope_x[p] - slope_y[q]) ** 2 + 0.5 * (x[p] - y[q]) ** 2
+            cost = (slope_x[p] - slope_y[q]) ** 2 + weight * (x[p] - y[q]) ** 2
             least[p + 1, q + 1] = cost + min(least[p, q], least[p, q + 1], least[p + 1, q])
     return least[n, n] / n
 
@@ -51,9 +52,9 @@ def test_the_elastic_distance_of_signals_is_dynamic_time_warping_of_values_and_s
         described = describe(demos)
         squares = squared_distances(described, described)
         rows = feature_rows(demos, ComparisonSpecification())
-    for r, block, n in ((2, rows[0], 33), (5, rows[2], 66)):
+    for r, block, n, weight in ((2, rows[0], 33, 2.0), (5, rows[2], 66, 0.5)):
         segments = [_segments(values, n) for values in block]
-        expected = [[_warped(a, b, 6) for b in segments] for a in segments]
+        expected = [[_warped(a, b, 6, weight) for b in segments] for a in segments]
         np.testing.assert_allclose(squares[r], expected, rtol=1e-4, atol=1e-5)
 
 
@@ -88,9 +89,55 @@ def test_what_differs_in_the_times_of_its_turns_alone_is_told_apart():
     assert Recognizer().fit(shown, ["fast", "slow"]).score(asked, truth) == 1.0
 
 
+def _held(seconds, at=0.3, n=120):
+    """A wave of a second that is held for so many more."""
+    u = np.linspace(0.0, 1.0, n)
+    steps = [u[u <= at], np.full(int(seconds * n), at), u[u > at]]
+    phase = np.concatenate(steps)
+    return kineme.Trajectory(np.arange(len(phase)) / n, np.sin(9.0 * phase)[:, None])
+
+
+@pytest.mark.parametrize("choice", ["always", "never"])
+@pytest.mark.parametrize("cutoff", [10.0, None])
+def test_signals_keep_their_rests_in_detail_and_nothing_else_does(choice, cutoff, monkeypatch):
+    """How long a value is held tells signals apart; a path that stops is the path that it would have been."""
+    monkeypatch.setenv("KINEME_COMPILED", choice)
+    briefly, long = _held(0.2), _held(1.0)
+    signals = describe([briefly, long], ComparisonSpecification(cutoff=cutoff))
+    apart = squared_distances(signals, signals)[:, 0, 1]
+    assert apart[5] > 0.1 > 10.0 * apart[2]
+    in_the_plane = [
+        kineme.Trajectory(one.times, np.hstack((one.positions, one.positions**2))) for one in (briefly, long)
+    ]
+    for paths, how in ((in_the_plane, DEFAULT_REPRESENTATIONS), ([briefly, long], AS_PATHS)):
+        described = describe(paths, ComparisonSpecification(how, cutoff=cutoff))
+        assert squared_distances(described, described)[5, 0, 1] < 0.01
+
+
+def test_gaps_in_the_stamps_of_signals_are_cut_short_in_detail():
+    """Samples that are missing are no value that was held."""
+    u = np.linspace(0.0, 1.0, 120)
+    x, later = np.sin(9.0 * u)[:, None], u + 2.0 * (u > 0.6)
+    described = describe([kineme.Trajectory(u, x), kineme.Trajectory(later, x)])
+    assert squared_distances(described, described)[5, 0, 1] < 0.05
+
+
+def test_a_stream_of_a_signal_compares_its_rests_as_predict_does():
+    """These differ by their rests alone, which beginnings cut short."""
+    recognizer = Recognizer().fit([_held(0.3), _held(0.9)], ["briefly", "long"])
+    shares = []
+    for seconds in (0.35, 0.8):
+        live, asked = recognizer.stream(), _held(seconds)
+        state = live.update(asked.times, asked.positions)
+        shares.append({guess.label: guess.confidence for guess in state.ranked})
+    assert recognizer.predict([_held(0.35), _held(0.8)]).tolist() == ["briefly", "long"]
+    assert shares[0]["briefly"] > shares[1]["briefly"] + 0.01
+    assert shares[1]["long"] > shares[0]["long"] + 0.01
+
+
 def test_turning_angles_and_clouds_of_signals_have_no_weight_of_their_own():
     own = [one.own_weight(1) for one in DEFAULT_REPRESENTATIONS]
-    assert own == [2.0, 1.0, 2.0, 0.0, 0.0, 6.0, 0.0]
+    assert own == [1.0, 1.0, 6.0, 0.0, 0.0, 6.0, 0.0]
     for d in (2, 3, 7):
         assert [one.own_weight(d) for one in DEFAULT_REPRESENTATIONS] == [one.weight for one in DEFAULT_REPRESENTATIONS]
     assert [one.own_weight(1) for one in AS_PATHS] == [one.weight for one in DEFAULT_REPRESENTATIONS]

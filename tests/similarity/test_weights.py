@@ -112,7 +112,7 @@ def test_own_weights_of_signals_leave_out_what_tells_nothing_of_them():
     own, auto, equal = (Recognizer(weights=weights).fit(demos) for weights in ("own", "auto", "equal"))
     kept = tuple(one for one, none in zip(DEFAULT_REPRESENTATIONS, silent, strict=True) if not none)
     assert own.representations_ == kept
-    np.testing.assert_allclose(own.weights_, np.array([2, 1, 2, 6]) / 11)
+    np.testing.assert_allclose(own.weights_, np.array([1, 1, 6, 6]) / 14)
     assert "turning" not in {one.quantity for one in auto.representations_}
     np.testing.assert_allclose(equal.weights_, 1 / 7)
     alone = Recognizer((DEFAULT_REPRESENTATIONS[0], DEFAULT_REPRESENTATIONS[3]), weights="own").fit(demos)

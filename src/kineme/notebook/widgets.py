@@ -97,9 +97,10 @@ class Draw(_Page):
         else:
             if isinstance(recognizer, ActionLibrary):
                 snapshot = snapshot_of_library(recognizer, most, DRAWN)
+                check_drawable(snapshot.header["comparison"]["n_dims"])
             else:
+                check_drawable(recognizer.n_dims_)
                 snapshot = snapshot_of_recognizer(recognizer, early=DRAWN)
-            check_drawable(snapshot.header["comparison"]["n_dims"])
             page = page_of(snapshot, "Draw movements", "notebook")
         super().__init__(_page=page, _title="Draw movements")
 

@@ -17,7 +17,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
 from kineme.recognition import explanation
-from kineme.recognition.classifiers import NearestEach, fit_classifier
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.recognition.convolutions import Convolutions
 from kineme.reporting.page import thumbnail
@@ -283,7 +283,7 @@ def known_labels(
     kernels' distances, so random convolutions, which tell classes apart where these do not, choose among all.
     """
     possible = p_values > error_rate
-    possible |= ~possible.any(axis=1, keepdims=True) | isinstance(classifier, Convolutions)
+    possible |= ~possible.any(axis=1, keepdims=True) | isinstance(classifier, BY_CONVOLUTIONS)
     labels = classes.astype(object)[np.where(possible, scores, -np.inf).argmax(axis=1)]
     labels[p_known <= error_rate] = None
     return np.asarray(labels)
@@ -331,7 +331,7 @@ def verdicts_of(
     if isinstance(classifier, Convolutions):
         probabilities = classifier.probabilities(scores)
     else:
-        similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
+        similar = scores if isinstance(classifier, NearestEach) else compared.nearest
         probabilities = class_probabilities(similar, calibration.exponent)
     examples = []  # the nearest of the class that is shown, and of the best-ranked other one
     for i, best in enumerate(like):
@@ -354,7 +354,7 @@ def verdicts_of(
             {name: float(share[rows, i].sum()) for name, rows in rows_of.items()},
             share[:, i],
             examples[i],
-            isinstance(classifier, Convolutions),
+            isinstance(classifier, BY_CONVOLUTIONS),
         )
         for i in range(len(labels))
     ]

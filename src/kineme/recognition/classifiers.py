@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.recognition.convolutions import fit_convolutions
+from kineme.recognition.convolutions import Convolutions, Kernels, fit_convolutions, fit_kernels, series_of, transform
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
 from kineme.similarity.scores import Classifier, Compared, most_similar
-from kineme.similarity.similarity import AveragedSimilarity
+from kineme.similarity.similarity import SHARE, AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS
 from kineme.validation import Array
 
@@ -27,6 +27,9 @@ _COMPARED = 500  # demonstrations by which the kernels are judged, at most
 #: Share of demonstrations left out that the kernels recognize from which on nothing else is tried, and by how much
 #: more the convolutions must recognize: on five of seven sets of people's movements the kernels are ahead.
 _ENOUGH, _AHEAD = 0.97, 0.01
+#: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
+PROFILED = 0.25
+_NO_PROFILE = 1e-9  # length of features that are all as their center
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
@@ -61,6 +64,39 @@ class NearestEach(Classifier):
         """Return the index (n,) of the class with the largest score."""
         one_each = len(compared.references) == len(compared.references.classes)
         return Nearest().best(compared) if one_each else super().best(compared)
+
+
+@dataclass(frozen=True, eq=False)
+class NearestProfiled(NearestEach):
+    """The score is that of `NearestEach`, and a share of a kernel on profiles, that of the nearest reference.
+
+    The profile is the features of random convolutions, `convolutions.transform`, centered at the mean of the references
+    and of length 1: it tells which details a movement has, wherever they are. So it is for what is never rotated, and
+    whose parts may come in another order or number, as those of signals and of sensors.
+
+    Attributes
+    ----------
+    kernels : Kernels
+    center : ndarray of shape (f,)
+    profiles : ndarray of shape (m, f)
+    width : float
+    """
+
+    kernels: Kernels = field(repr=False)
+    center: Array = field(repr=False)
+    profiles: Array = field(repr=False)
+    width: float
+
+    def scores(self, compared: Compared) -> Array:
+        """Return the logarithm of the average of both, (n, C)."""
+        cosines = profiles_of(compared.described, self.kernels, self.center) @ self.profiles.T
+        nearest = np.maximum.reduceat(cosines, compared.references.first, axis=1)
+        by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
+        return np.logaddexp(np.log(1.0 - PROFILED) + compared.nearest_each, np.log(PROFILED) + by_profile)
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Return the index (n,) of the class with the largest score."""
+        return self.scores(compared).argmax(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,22 +174,46 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
     return SupportVectors(similarity, model)
 
 
+def profiles_of(described: Described, kernels: Kernels, center: Array) -> Array:
+    """Return features of random convolutions less their center, at length 1, (n, f)."""
+    features = transform(series_of(described), kernels) - center
+    return np.asarray(features / np.maximum(np.linalg.norm(features, axis=1, keepdims=True), _NO_PROFILE))
+
+
+def fit_profiled(comparison: Comparison, references: References) -> NearestEach:
+    """Return the kernels with profiles of the references; the width is that of any representation, see `SHARE`.
+
+    Without profiles where all are the same, or no class is another one's impostor.
+    """
+    kernels = fit_kernels(series_of(references.described))
+    center = transform(series_of(references.described), kernels).mean(axis=0)
+    profiles = profiles_of(references.described, kernels, center)
+    cosines = profiles @ profiles.T
+    cosines[references.labels[:, None] == references.labels] = -np.inf
+    apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
+    width = SHARE * float(np.median(apart))
+    return NearestProfiled(kernels, center, profiles, width) if 0 < width < np.inf else NearestEach()
+
+
 def fit_best(comparison: Comparison, references: References) -> Classifier:
     """Return the convolutions where they recognize clearly more of the demonstrations left out, else the kernels.
 
     Considered from eight demonstrations of each class on, of movements that are compared in detail and not rotated.
+    Signals, and more than three columns that are no points, have profiles beside the kernels, if there are few or many.
     """
     pairs, rotated = references.described.pairs, comparison.procrustes.max_angle > 0
     in_detail = pairs is not None and pairs.details is not None and (pairs.upright or not rotated)
     able = in_detail and comparison.normalization.translation
     n_classes = len(references.classes)
-    if not able or n_classes < 2 or references.counts.min() < FEWEST or len(references) > MOST:
+    if not able or n_classes < 2 or len(references) > MOST:
         return NearestEach()
-    by_kernels = _recognized_left_out(comparison, references)
+    profiled = not rotated and comparison.n_dims not in (2, 3) and comparison.mean == "arithmetic"
+    by_nearest = fit_profiled(comparison, references) if profiled else NearestEach()
+    by_kernels = 1.0 if references.counts.min() < FEWEST else _recognized_left_out(comparison, references)
     if by_kernels >= _ENOUGH:
-        return NearestEach()
+        return by_nearest
     fitted, by_convolutions = fit_convolutions(comparison, references)
-    return fitted if by_convolutions >= by_kernels + _AHEAD else NearestEach()
+    return fitted if by_convolutions >= by_kernels + _AHEAD else by_nearest
 
 
 def _recognized_left_out(comparison: Comparison, references: References) -> float:
@@ -165,6 +225,9 @@ def _recognized_left_out(comparison: Comparison, references: References) -> floa
     owners = np.searchsorted(references.first, chosen, side="right") - 1
     return float((scores.argmax(axis=1) == owners).mean())
 
+
+#: Those in which random convolutions rank the classes, alone or beside the kernels.
+BY_CONVOLUTIONS = (Convolutions, NearestProfiled)
 
 #: Name -> what fits the classifier.
 CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {

@@ -71,20 +71,22 @@ def fit_kernels(series: Single) -> Kernels:
         for row in chosen:
             row[rng.permutation(c)[: int(2 ** rng.uniform(0, np.log2(min(c, _LENGTH) + 1)))]] = 1.0
         one_each = series[rng.integers(n, size=84)]
-        own = np.einsum("kct,kc->kt", _convolved(one_each, dilation)[np.arange(84), :, np.arange(84)], chosen)
+        own = _convolved(np.einsum("kct,kc->kt", one_each, chosen)[None], dilation)[0]
         shares = ((at * n_thresholds * 84 + np.arange(84 * n_thresholds) + 1) * _GOLDEN % 1.0).reshape(84, -1)
         thresholds.append(np.stack([np.quantile(row, share) for row, share in zip(own, shares, strict=True)]))
         channels.append(chosen)
     return Kernels(dilations, tuple(channels), tuple(each.astype(np.float32) for each in thresholds))
 
 
-def _convolved(series: Single, dilation: int) -> Single:
-    """Return all kernels (n, c, 84, T) of series (n, c, T), which are continued by zeros."""
-    T = series.shape[2]
+def _convolved(sums: Single, dilation: int) -> Single:
+    """Return each kernel of its own sum of channels, (n, 84, T); these are continued by zeros."""
+    T = sums.shape[2]
     reach = (_LENGTH // 2) * dilation
-    padded = np.pad(series, ((0, 0), (0, 0), (reach, reach)))
-    shifted = np.stack([padded[:, :, k * dilation : k * dilation + T] for k in range(_LENGTH)], axis=2)
-    return np.asarray(_weights() @ shifted)
+    padded, weights = np.pad(sums, ((0, 0), (0, 0), (reach, reach))), _weights()
+    convolved = np.zeros_like(sums)
+    for k in range(_LENGTH):
+        convolved += weights[:, k, None] * padded[:, :, k * dilation : k * dilation + T]
+    return convolved
 
 
 def transform(series: Single, kernels: Kernels) -> Array:
@@ -93,7 +95,7 @@ def transform(series: Single, kernels: Kernels) -> Array:
     for start in range(0, len(series), _AT_ONCE):
         some, parts = series[start : start + _AT_ONCE], []
         for dilation, chosen, thresholds in zip(*kernels, strict=True):
-            sums = np.einsum("nckt,kc->nkt", _convolved(some, dilation), chosen, optimize=True)
+            sums = _convolved(chosen @ some, dilation)  # a convolution of a sum is the sum of convolutions
             parts.append((sums[:, :, None] > thresholds[:, :, None]).mean(axis=3).reshape(len(some), -1))
         rows.append(np.concatenate(parts, axis=1))
     return np.concatenate(rows) if rows else np.empty((0, 0))

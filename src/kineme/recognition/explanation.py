@@ -23,7 +23,7 @@ _NEAR = 0.5  # of the largest difference: the part around it that is named
 _SAME = 0.005  # of the size: what is rounded to 0 %
 _ALIKE = 0.05  # of the size: differences that are no more than people's hands
 _ALONG = replace(POSITIONS, n_points=N_POINTS)
-_CONVOLUTIONS = "ranked by random convolutions; example and shares are those of the kernels"
+_CONVOLUTIONS = "ranked with random convolutions; example and shares are those of the kernels"
 
 
 class Part(NamedTuple):
@@ -104,7 +104,7 @@ class Explanation:
     shares : dict from str to float
         Share of each representation in the similarity to the nearest example.
     by_convolutions : bool
-        True if random convolutions ranked the classes, and the kernels chose the examples alone.
+        True if random convolutions ranked the classes, alone or beside the kernels, which chose the examples alone.
     """
 
     answer: str

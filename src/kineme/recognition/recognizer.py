@@ -72,9 +72,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     classifier : {"auto", "nearest", "nearest-each", "prototype", "svm", "convolutions"}, default "auto"
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
-        "convolutions" of the path. "auto" is "nearest-each", or from eight demonstrations of each class on
-        "convolutions" where these recognize more of them when they are left out. Whether a movement is known is told by
-        the kernels, and the convolutions then name it: see `kineme.recognition.answer.known_labels`.
+        "convolutions" of the path. "auto" is "nearest-each", of signals and of more than three columns that are no
+        points with profiles of random convolutions beside it, see `NearestProfiled`; or from eight demonstrations of
+        each class on "convolutions" where these recognize more of them when they are left out. Whether a movement is
+        known is told by the kernels, and the convolutions then name it: see `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner

@@ -26,6 +26,7 @@ from kineme.similarity.specification import (
     DETAILED_ELASTIC,
     PAIR_QUANTITIES,
     POSITIONS,
+    SIGNAL_ELASTIC,
     Compares,
     ComparisonSpecification,
     Normalization,
@@ -107,10 +108,11 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     paths = [block.reshape(len(block), d, -1) for block in (singles[r], *singles[len(how.by_rows) :])]
     procrustes = with_mixing(procrustes, paths[0])
     paths = [procrustes.mixed(block) for block in paths]
-    slopes = d == 1 and how.representations[r].signal
+    slopes = how.are_signals(d)
     details = shapes_of(paths[1], DETAILED_ELASTIC, DETAILED_CLOUD, slopes=slopes) if len(paths) == 2 else None
     measures = tuple(representation.measure for representation in how.by_pairs)
-    pairs = Pairs(blocks[r], shapes_of(paths[0], slopes=slopes), measures, details, how.upright)
+    shapes = shapes_of(paths[0], SIGNAL_ELASTIC if slopes else None, slopes=slopes)
+    pairs = Pairs(blocks[r], shapes, measures, details, how.upright)
     return Described(blocks, procrustes, how.mean, pairs, own)
 
 
@@ -205,16 +207,22 @@ def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | Non
 
 
 def detailed_paths(demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification) -> tuple[Array, Array]:
-    """Return `even_paths` below the cutoff, and in detail; twice the same where nothing is compared in detail."""
+    """Return `even_paths` below the cutoff, and in detail; twice the same where nothing is compared in detail.
+
+    Signals keep their rests in detail: a value that is held is part of them, as a corner is part of a path.
+    """
     unpaused = _unpaused(demos, start, stop)
     paths = smooth_evenly(*unpaused, how.cutoff)
-    detailed = how.detailed and how.cutoff is not None
-    return paths, smooth_evenly(*unpaused, how.detailed_cutoff) if detailed else paths
+    if how.detailed and how.are_signals(demos.n_dims):
+        unpaused = _unpaused(demos, start, stop, rests=False)
+    elif not how.detailed or how.cutoff is None:
+        return paths, paths
+    return paths, smooth_evenly(*unpaused, how.detailed_cutoff)
 
 
-def _unpaused(demos: Demonstrations, start: int, stop: int) -> tuple[Demonstrations, int, int]:
+def _unpaused(demos: Demonstrations, start: int, stop: int, *, rests: bool = True) -> tuple[Demonstrations, int, int]:
     """Return movements start:stop with their pauses cut short, and where they are."""
-    shorter = without_pauses(demos, start, stop)
+    shorter = without_pauses(demos, start, stop, rests=rests)
     return (demos, start, stop) if shorter is None else (shorter, 0, stop - start)
 
 

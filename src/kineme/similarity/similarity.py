@@ -279,10 +279,18 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
         raise SpecificationError(
             "expected training movements that differ, got one movement or all the same; add demonstrations"
         )
-    # Movements that do not differ in one representation have a similarity of 1 there.
-    # In detail they are as wide as of the same quantity that is rotated: without a rotation movements of one class are
-    # farther apart, and wider kernels would count where only the rotated ones tell.
-    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)[some.coarse()]
+    return np.maximum(_as_wide_as_twins(widths, some), _LEAST * sizes)
+
+
+def _as_wide_as_twins(widths: list[float | None], described: Described) -> Array:
+    """Return widths (R,), those in detail as of the same quantity that is not, if movements differ in that.
+
+    Without a rotation movements of one class are farther apart, and wider kernels would count where only the rotated
+    ones tell. Movements that do not differ in one representation have a similarity of 1 there.
+    """
+    own = np.array([np.inf if width is None else width for width in widths])
+    twins = own[described.coarse()]
+    return np.where(np.isfinite(twins), twins, own)
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
@@ -331,7 +339,7 @@ def gap_widths(described: Described) -> Array:
         widths.append(_share_of_median(_beyond_the_gap(ordered, same), same))
     if all(width is None for width in widths):
         raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
-    return np.array([np.inf if width is None else width for width in widths])[described.coarse()]
+    return _as_wide_as_twins(widths, described)
 
 
 def median_distances(described: Described) -> Array:

@@ -50,6 +50,10 @@ PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "
 #: Detailed representations are smoothed below so many times as many cycles as the others, and are finer.
 DETAIL = 4.0
 DETAILED_ELASTIC, DETAILED_CLOUD = ElasticSpec(n_segments=66), CloudSpec(n_points=32)
+#: Signals are compared by their values rather than their slopes, and in detail by their slopes: two that differ.
+SIGNAL_ELASTIC = ElasticSpec(position_weight=2.0)
+#: Weights of representations of signals, relative to those of paths, but for those in detail.
+_OF_SIGNALS = {"positions": 0.5, "forcing": 1.0, "elastic": 3.0, "turning": 0.0, "cloud": 0.0}
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,9 @@ class Representation:
         another prior than the default one says how movements are rotated.
     signal : bool, default True
         Compare movements of one dimension, which are signals, over time whatever `arc_share` says, by slopes where
-        others have tangents; turning angles and point clouds, which tell nothing of them, then have no weight of their
-        own. False describes them as paths, as libraries of earlier versions do.
+        others have tangents, in detail with their rests. Turning angles and point clouds, which tell nothing of them,
+        then have no weight of their own, elastic paths three times theirs, positions half of it. False describes them
+        as paths, as libraries of earlier versions do.
 
     Raises
     ------
@@ -128,8 +133,10 @@ class Representation:
         return self.quantity in PAIR_QUANTITIES
 
     def own_weight(self, n_dims: int) -> float:
-        """Return the weight, which is 0 for what tells nothing of signals."""
-        return 0.0 if n_dims == 1 and self.signal and self.quantity in ("turning", "cloud") else self.weight
+        """Return the weight, which is another one for signals: 0 for what tells nothing of them."""
+        if n_dims > 1 or not self.signal or (self.detailed and self.quantity == "elastic"):
+            return self.weight
+        return _OF_SIGNALS[self.quantity] * self.weight
 
     @property
     def measure(self) -> int:
@@ -415,6 +422,10 @@ class ComparisonSpecification:
     def detailed(self) -> bool:
         """True if movements are compared in detail, too."""
         return any(representation.detailed for representation in self.representations)
+
+    def are_signals(self, n_dims: int) -> bool:
+        """Return True if movements of so many dimensions are compared pair by pair as signals, over time."""
+        return n_dims == 1 and bool(self.by_pairs) and self.representations[rotating(self.representations)].signal
 
     @property
     def upright(self) -> bool:

@@ -28,9 +28,8 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
-from kineme.recognition.classifiers import Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, Nearest, NearestEach, Prototype, fit_prototype
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
-from kineme.recognition.convolutions import Convolutions
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
@@ -163,6 +162,8 @@ def pause_rule(allowance: float = 1.0) -> dict[str, float]:
 def _detail_rule(how: Comparison, details: Shapes) -> dict[str, Any]:
     """Write how movements are compared in detail."""
     own = _fields(how.specification, "upright") | {"cutoff": how.specification.detailed_cutoff}
+    if how.specification.are_signals(how.n_dims):
+        own["pauses"] = pause_rule() | {"radius": -1.0}  # nothing is so near to itself: rests stay
     positions = _fields(how.specification.detailed_positions, "arc_share", "n_points", "signal")
     return pair_rule(details) | own | {"positions": positions}
 
@@ -203,11 +204,11 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
     if isinstance(classifier, Prototype):
         return {"classifier": "prototype", "medoids": classifier.medoids.tolist()}
     for kind, name in ((NearestEach, "nearest-each"), (Nearest, "nearest")):
-        if isinstance(classifier, kind):
+        if isinstance(classifier, kind) and not isinstance(classifier, BY_CONVOLUTIONS):
             return {"classifier": name}
     raise SpecificationError(
         "expected the classifier to be nearest-each, nearest or prototype, got "
-        f"{'convolutions' if isinstance(classifier, Convolutions) else 'svm'}, which the page does not have; "
+        f"{'convolutions' if isinstance(classifier, BY_CONVOLUTIONS) else 'svm'}, which the page does not have; "
         "pass classifier='nearest-each'"
     )
 

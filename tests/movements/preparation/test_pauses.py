@@ -20,18 +20,19 @@ pauses = given(
 )
 
 
-def cut(demos):
-    return cut_pauses(demos.times, demos.positions, demos.offsets)
+def cut(demos, **options):
+    return cut_pauses(demos.times, demos.positions, demos.offsets, **options)
 
 
+@pytest.mark.parametrize("rests", [True, False])
 @pauses
-def test_compiled_and_plain_cut_the_same(seed, seconds, at_rest, noise, d):
+def test_compiled_and_plain_cut_the_same(rests, seed, seconds, at_rest, noise, d):
     demos = interrupted(draw_shapes([2, 3], d, seed, n_samples=60 + seed % 90), seconds, at_rest, noise, seed)
     found = []
     for choice in ("always", "never"):
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("KINEME_COMPILED", choice)
-            found.append(cut(demos))
+            found.append(cut(demos, rests=rests))
     assert (found[0] is None) == (found[1] is None)
     for compiled, plain in zip(*(one or () for one in found), strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9)
@@ -80,6 +81,18 @@ def test_what_is_left_of_pauses_by_hand(monkeypatch, choice, steps, seconds, cou
     parts = cut(demos)
     assert demos.durations[0] == pytest.approx(seconds) if parts is None else parts[0][-1] == pytest.approx(seconds)
     assert (None if parts is None else len(parts[0])) == count
+
+
+@pytest.mark.parametrize("choice", ["always", "never"])
+def test_rests_can_stay_while_gaps_are_cut(monkeypatch, choice):
+    monkeypatch.setenv("KINEME_COMPILED", choice)
+    at_rest, both = stepped([(64, 1.0), (-20, 1.0), (64, 1.0)]), stepped([(16, 1.0), (1, 100.0), (-20, 1.0), (15, 1.0)])
+    assert cut(at_rest) is not None
+    assert cut(at_rest, rests=False) is None
+    times, positions, _ = cut(both, rests=False)
+    assert len(times) == len(both.times)
+    assert times[-1] == pytest.approx(51 + 3 * 54 / 32)  # 3 s for the gap, thrice what its step takes at the mean speed
+    np.testing.assert_array_equal(positions, both.positions)
 
 
 @pytest.mark.parametrize(("noise", "rests"), [(0.9, True), (1.1, False)])

@@ -10,7 +10,7 @@ from kineme.runtime.compiled import jit
 
 
 @jit
-def fill_cut(samples, offsets, allowance, cut, ends):  # type: ignore[no-untyped-def]
+def fill_cut(samples, offsets, rule, cut, ends):  # type: ignore[no-untyped-def]
     """Movements with their pauses cut short, one after the other from 0 on; whether any had one, see `cut_pauses`."""
     times, positions = samples
     cut_times, cut_positions = cut
@@ -24,7 +24,7 @@ def fill_cut(samples, offsets, allowance, cut, ends):  # type: ignore[no-untyped
             for k in range(positions.shape[1]):
                 own[j, k] = positions[offsets[i] + j, k]
         for _ in range(pauses.ROUNDS):
-            if not _fill_shortened(own_times[:n], own[:n], allowance, steps[:n], moving[:n]):
+            if not _fill_shortened(own_times[:n], own[:n], rule, steps[:n], moving[:n]):
                 break
             changes, elapsed, left = True, 0.0, 0
             for j in range(n):
@@ -40,11 +40,15 @@ def fill_cut(samples, offsets, allowance, cut, ends):  # type: ignore[no-untyped
 
 
 @jit
-def _fill_shortened(times, positions, allowance, steps, moving):  # type: ignore[no-untyped-def]
+def _fill_shortened(times, positions, rule, steps, moving):  # type: ignore[no-untyped-def]
     """Steps of one movement, as far as they count, and which samples are left; whether anything changes."""
-    last = len(times) - 1
+    last, (allowance, shortens_rests) = len(times) - 1, rule
     usual = _fill_steps(times, steps)
-    reach, rests, between = _fill_resting(positions, moving)
+    reach, rests, between = 0.0, False, False
+    if shortens_rests:
+        reach, rests, between = _fill_resting(positions, moving)
+    else:
+        moving[:] = True
     motion, path = 0.0, 0.0
     for j in range(last):
         if moving[j]:

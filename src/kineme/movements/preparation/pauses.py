@@ -33,11 +33,13 @@ _OPERATIONS, _PER_NUMBER = 60_000, 100  # of NumPy, of which many calls are need
 Parts = tuple[Array, Array, NDArray[np.intp]]
 
 
-def without_pauses(demos: Demonstrations, start: int, stop: int, allowance: float = 1.0) -> Demonstrations | None:
+def without_pauses(
+    demos: Demonstrations, start: int, stop: int, allowance: float = 1.0, *, rests: bool = True
+) -> Demonstrations | None:
     """Movements start:stop with their pauses cut short, see `cut_pauses`; None if they have none, the usual case."""
     offsets = demos.offsets[start : stop + 1]
     rows = slice(int(offsets[0]), int(offsets[-1]))
-    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0], allowance)
+    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0], allowance, rests=rests)
     if cut is None:
         return None
     times, positions, ends = cut
@@ -45,7 +47,9 @@ def without_pauses(demos: Demonstrations, start: int, stop: int, allowance: floa
     return Demonstrations.of_movements(Movements(positions, ends, durations, times))
 
 
-def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowance: float = 1.0) -> Parts | None:
+def cut_pauses(
+    times: Array, positions: Array, offsets: NDArray[np.intp], allowance: float = 1.0, *, rests: bool = True
+) -> Parts | None:
     """Cut short the time in which a movement does not move, or in which nothing was recorded of it.
 
     So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
@@ -59,19 +63,20 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowa
     reach takes at the mean speed, too, and at the end as at most a quarter of the time in motion. It keeps as many
     samples as fit into that, evenly spaced, at least three.
 
-    `allowance` times these shares of the time in motion, and of the reach, are left of pauses. Times are returned from
-    0 in each movement; first and last samples stay. None if there is no pause.
+    `allowance` times these shares of the time in motion, and of the reach, are left of pauses. Without `rests` these
+    stay, and gaps alone are cut short: who holds a value says something by how long. Times are returned from 0 in each
+    movement; first and last samples stay. None if there is no pause.
     """
     if use_compiled(_OPERATIONS + _PER_NUMBER * positions.size):
         cut_times, cut_positions, ends = np.empty(len(times)), np.empty(positions.shape), np.empty_like(offsets)
         fill = compiled_module("kineme.movements.preparation._pauses").fill_cut
-        if not fill((times, positions), offsets, allowance, (cut_times, cut_positions), ends):
+        if not fill((times, positions), offsets, (allowance, rests), (cut_times, cut_positions), ends):
             return None
         return cut_times[: ends[-1]], cut_positions[: ends[-1]], ends
     cut: Parts | None = None
     for _ in range(ROUNDS):
         steps, moving = np.empty(len(times)), np.ones(len(times), dtype=np.bool_)
-        if not _fill_shortened(times, positions, offsets, allowance, steps, moving):
+        if not _fill_shortened((times, positions), offsets, (allowance, rests), steps, moving):
             break
         elapsed = np.append(0.0, np.cumsum(steps)[:-1])
         elapsed -= np.repeat(elapsed[offsets[:-1]], np.diff(offsets))
@@ -81,9 +86,14 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp], allowa
 
 
 def _fill_shortened(
-    times: Array, positions: Array, offsets: NDArray[np.intp], allowance: float, steps: Array, moving: NDArray[np.bool_]
+    samples: tuple[Array, Array],
+    offsets: NDArray[np.intp],
+    rule: tuple[float, bool],
+    steps: Array,
+    moving: NDArray[np.bool_],
 ) -> bool:
     """Write the time that each step counts, 0 after last samples, and which samples are kept; whether any changes."""
+    (times, positions), (allowance, rests) = samples, rule
     first, last, lengths = offsets[:-1], offsets[1:] - 1, np.diff(offsets)
     owner = np.repeat(np.arange(len(lengths)), lengths)
     steps[:] = np.diff(times, append=times[-1])
@@ -94,7 +104,7 @@ def _fill_shortened(
     apart = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
     apart[last] = 0.0
     reach = np.maximum.reduceat(np.linalg.norm(positions - positions[first][owner], axis=1), first)
-    resting = _resting(positions, offsets, RADIUS * reach[owner])
+    resting = _resting(positions, offsets, RADIUS * reach[owner]) if rests else np.zeros(len(times), np.bool_)
     motion = np.add.reduceat(np.where(resting, 0.0, np.minimum(steps, usual[owner])), first)
     path = np.add.reduceat(np.where(resting, 0.0, apart), first)
     pace = np.divide(motion, path, out=np.zeros(len(path)), where=path > 0)  # seconds for a unit of length

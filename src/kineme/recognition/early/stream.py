@@ -175,6 +175,8 @@ class Live:
         how, unpaused = self._comparison.specification, _without_pauses(samples)
         even = _smooth(times, positions, how.cutoff)
         whole = _smooth(*unpaused, how.cutoff)
+        if how.are_signals(positions.shape[1]):
+            unpaused = _without_pauses(samples, rests=False)
         details = _smooth(*unpaused, how.detailed_cutoff) if how.detailed else whole
         so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], (whole, details))
         evidence = log_evidence(self._hypotheses, so_far)
@@ -207,10 +209,10 @@ def _smooth(times: Array, positions: Array, cutoff: float | None) -> Array:
     return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
 
-def _without_pauses(samples: Array, allowance: float = 1.0) -> tuple[Array, Array]:
+def _without_pauses(samples: Array, allowance: float = 1.0, *, rests: bool = True) -> tuple[Array, Array]:
     """Return times and positions of samples (k, 1 + d), as those of stored movements are described."""
     times, positions = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
-    cut = cut_pauses(times, positions, np.array([0, len(samples)]), allowance)
+    cut = cut_pauses(times, positions, np.array([0, len(samples)]), allowance, rests=rests)
     return (times, positions) if cut is None else cut[:2]
 
 

@@ -220,13 +220,13 @@ function angle(vectors, p, q, d) {
 /** A movement as it is compared: its smooth path, rows with their squared norms, and shapes. */
 export function describeMovement(movement, how, arrays) {
   const unpaused = withoutPauses(movement, how.pauses);
-  const smooth = (cutoff) => evenPath(unpaused, cutoff, N_POINTS);
+  const smooth = (cutoff, rule) => evenPath(rule ? withoutPauses(movement, rule) : unpaused, cutoff, N_POINTS);
   return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 
-/** A path smoothed as the comparison says: for what is compared in detail, if anything, it is smoothed less. */
+/** A path smoothed as the comparison says: what is compared in detail, if anything, less, by its own rule of pauses. */
 export function smoothly(how, smooth) {
-  return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff) };
+  return { path: smooth(how.cutoff), details: how.details && smooth(how.details.cutoff, how.details.pauses) };
 }
 
 /** The same of a path, smoothed both ways, relative to a first position. */

@@ -78,7 +78,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const duration = active.times.at(-1) - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
     const unpaused = withoutPauses(soFar, pauses);
-    const whole = smoothly(how, (cycles) => smooth(unpaused, cycles));
+    const whole = smoothly(how, (cycles, rule) => smooth(rule ? withoutPauses(soFar, rule) : unpaused, cycles));
     const elapsed = times[n - 1] - times[0];
     const evidence = logEvidence(stored, begun, whole, positions[0], duration);
     const share = shares(stored, evidence);
