@@ -203,7 +203,8 @@ other = rclpy.create_node("controller")
 executor = MultiThreadedExecutor(4)
 executor.add_node(other)
 server = ActionServer(other, FollowJointTrajectory, "/follow", execute, cancel_callback=lambda _: CancelResponse.ACCEPT)
-threading.Thread(target=executor.spin, daemon=True).start()
+spinning = threading.Thread(target=executor.spin, daemon=True)
+spinning.start()
 arm = ArmClient(node, robot.joints, plan, "/follow")
 asking = peer.create_publisher(String, "/kineme/execute", 10)
 peer.create_subscription(String, "/kineme/executed", lambda message: said.append(json.loads(message.data)), 10)
@@ -242,6 +243,8 @@ library.close()
 print(json.dumps([[answer for answer in said if answer["state"]], canceled, list(goals[0].joint_names), len(first),
                   first[0].positions.tolist(), robot.rest.tolist(), len(goals)]))
 executor.shutdown()
+spinning.join(15.0)  # a thread of ROS that outlives the program ends it as a crash
+rclpy.try_shutdown()
 """
 
 

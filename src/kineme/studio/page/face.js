@@ -264,10 +264,9 @@ function start() {
     };
   become({});
   // Primitives alone recognize nothing; what moves there is where Python or the cell put it last.
-  hearNotebook(({ moved: { name, start, goal, via } }) => {
-    if (header.early || state.held) return;
-    const ends = (moving) => JSON.stringify([moving?.name, moving?.start, moving?.goal, moving?.via]);
-    if (ends(state.moving) !== ends({ name, start, goal, via })) choose(name, { start, goal, via });
+  hearNotebook(({ moved }) => {
+    const place = (moving) => JSON.stringify(["name", "start", "goal", "via"].map((part) => moving?.[part]));
+    if (!header.early && !state.held && place(state.moving) !== place(moved)) choose(moved.name, moved);
   });
   // What is drawn first should not wait for what is made once.
   if (header.early) window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));

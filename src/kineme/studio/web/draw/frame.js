@@ -25,10 +25,8 @@ export class Frame {
   }
 
   grow(point) {
-    if (!this.low.length) {
-      this.low = point.map((value) => value - this.size / 2);
-      this.high = point.map((value) => value + this.size / 2);
-    }
+    if (!this.low.length)
+      [this.low, this.high] = [-0.5, 0.5].map((share) => point.map((value) => value + share * this.size));
     point.forEach((value, k) => {
       const more = WIDER * (this.high[k] - this.low[k]);
       if (value < this.low[k]) this.low[k] = value - more;

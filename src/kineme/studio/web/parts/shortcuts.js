@@ -3,17 +3,15 @@ import { undo } from "./changes.js";
 import { byId } from "./elements.js";
 import { currentView, show, VIEWS } from "./views.js";
 
-/** Whether a key is for a field in which one writes. */
-const writes = (target) =>
-  target.closest?.("input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]");
-
 function list() {
   byId("keys").showModal();
   byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
-/** Whether a key is for something else: a field, or a dialog. */
-const isTaken = ({ target }) => writes(target) || document.querySelector("dialog[open]");
+const FIELDS = "input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]";
+
+/** Whether a key is for something else: a field in which one writes, or a dialog. */
+const isTaken = ({ target }) => target.closest?.(FIELDS) || document.querySelector("dialog[open]");
 
 const commands = (event, keys) =>
   (event.ctrlKey || event.metaKey) &&
