@@ -29,8 +29,7 @@ _COMPARED = 500  # demonstrations by which the kernels are judged, at most
 _ENOUGH, _AHEAD = 0.97, 0.01
 #: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
 PROFILED = 0.25
-_NO_PROFILE = 1e-9  # length of features that are all as their center
-_SAME = 1e-3  # width of kernels on profiles, of length 1: smaller ones are rounding
+_NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 

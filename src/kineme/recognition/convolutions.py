@@ -26,10 +26,7 @@ _FEATURES = 2000
 _AT_ONCE = 64  # movements transformed together
 _GOLDEN = (np.sqrt(5) + 1) / 2
 _ALPHAS = np.logspace(-1, 5, 13)
-_TINY = 1e-12  # of a probability
-#: Put on thresholds, in units of a movement's size: what a held value or a column that does not move makes is often
-#: equal to one, and rounding or the noise of a sensor at rest would decide whether it is above.
-_TIE = 1e-3
+_TINY, _TIE = 1e-12, 1e-3  # of a probability; put on thresholds, which held values equal, but for rounding
 _SHARPNESS = np.logspace(-1, 2, 61)  # of the softmax of scores, of which the most likely is taken
 
 Single = NDArray[np.float32]
