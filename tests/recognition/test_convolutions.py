@@ -217,6 +217,23 @@ def test_one_class_or_copies_have_no_profiles():
     assert not isinstance(kineme.Recognizer().fit(shown[:2]).classifier_, NearestProfiled)
     copies = [shown[0], shown[0], shown[0], shown[1]]
     assert not isinstance(kineme.Recognizer().fit(copies, list("aabb")).classifier_, NearestProfiled)
+    time = np.linspace(0, 1, 80)[:, None]
+    twice = [np.sin(6 * time), np.sin(6 * time), np.cos(9 * time)]  # their cosine is 1 but for rounding
+    assert not isinstance(kineme.Recognizer().fit(twice, list("abc")).classifier_, NearestProfiled)
+
+
+@pytest.mark.parametrize("n_dims", [1, 5])
+def test_held_values_and_still_columns_have_the_same_profile_at_any_noise_of_a_sensor(n_dims):
+    """What they make is equal to thresholds, and rounding would decide whether it is above."""
+    rng = np.random.default_rng(0)
+    levels = rng.integers(0, 4, size=(8, 6, n_dims)).astype(float)
+    levels[:, :, 4:] = 7.3
+    held = [np.repeat(own, rng.integers(15, 40, size=6), axis=0) for own in levels]
+    recognizer = kineme.Recognizer().fit(held, np.arange(8) // 2)
+    classifier = recognizer.classifier_
+    noisy = [movement + 1e-6 * rng.normal(size=movement.shape) for movement in held]
+    profiles = profiles_of(recognizer.describe(noisy), classifier.kernels, classifier.center)
+    np.testing.assert_allclose((profiles * classifier.profiles).sum(axis=1), 1.0, atol=0.003)
 
 
 def test_without_details_there_are_none_that_queries_would_lack():

@@ -59,6 +59,19 @@ def test_an_answer_is_calibrated_only_if_every_class_is():
     assert mixed.calibrated(0.05).tolist() == [True, False]
 
 
+@pytest.mark.parametrize("n_dims", [1, 2, 6])
+def test_one_movement_shown_under_two_names_leaves_the_answers_in_numbers(n_dims):
+    """Copies are at no distance from each other, which tells nothing about how far movements of a class are apart."""
+    demos = draw_shapes((1, 1), n_dims, seed=3)
+    movements = [demos[0].positions, demos[0].positions, demos[1].positions]
+    answers = Recognizer().fit(movements, ["a", "the same", "another"]).recognize(movements)
+    assert [answer.label for answer in answers] == ["a", "a", "another"]
+    for answer in answers:
+        np.testing.assert_allclose(sum(answer.probabilities.values()), 1.0)
+        assert answer.p_known == 1.0
+        assert np.isfinite([answer.confidence, *answer.p_values.values()]).all()
+
+
 def test_a_guess_shows_in_what_is_printed(fitted):
     once, asked = fitted[(1,) * 12]
     assert "calibrated=False" in repr(once.recognize(asked))

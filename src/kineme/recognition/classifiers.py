@@ -29,7 +29,7 @@ _COMPARED = 500  # demonstrations by which the kernels are judged, at most
 _ENOUGH, _AHEAD = 0.97, 0.01
 #: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
 PROFILED = 0.25
-_NO_PROFILE = 1e-9  # length of features that are all as their center
+_NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
@@ -183,7 +183,7 @@ def profiles_of(described: Described, kernels: Kernels, center: Array) -> Array:
 def fit_profiled(comparison: Comparison, references: References) -> NearestEach:
     """Return the kernels with profiles of the references; the width is that of any representation, see `SHARE`.
 
-    Without profiles where all are the same, or no class is another one's impostor.
+    Without profiles where most have a copy in another class, which leaves a width of rounding, or there is one class.
     """
     kernels = fit_kernels(series_of(references.described))
     center = transform(series_of(references.described), kernels).mean(axis=0)
@@ -192,7 +192,7 @@ def fit_profiled(comparison: Comparison, references: References) -> NearestEach:
     cosines[references.labels[:, None] == references.labels] = -np.inf
     apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
     width = SHARE * float(np.median(apart))
-    return NearestProfiled(kernels, center, profiles, width) if 0 < width < np.inf else NearestEach()
+    return NearestProfiled(kernels, center, profiles, width) if _SAME < width < np.inf else NearestEach()
 
 
 def fit_best(comparison: Comparison, references: References) -> Classifier:

@@ -430,8 +430,8 @@ def typical_scale(impostors: Array, reach: float = REACH) -> float:
 
 
 def typical_distance(impostors: Array) -> float:
-    """Return the median distance to the nearest other class; with one class, and so without any distance, `FOREIGN`."""
-    apart = impostors[np.isfinite(impostors)]
+    """Return the median distance to the nearest other class, without copies; with one class, without any, `FOREIGN`."""
+    apart = impostors[np.isfinite(impostors) & (impostors > 0)]
     return float(np.median(apart)) if len(apart) else FOREIGN
 
 

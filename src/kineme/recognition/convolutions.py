@@ -26,7 +26,7 @@ _FEATURES = 2000
 _AT_ONCE = 64  # movements transformed together
 _GOLDEN = (np.sqrt(5) + 1) / 2
 _ALPHAS = np.logspace(-1, 5, 13)
-_TINY = 1e-12  # of a probability
+_TINY, _TIE = 1e-12, 1e-3  # of a probability; put on thresholds, which held values equal, but for rounding
 _SHARPNESS = np.logspace(-1, 2, 61)  # of the softmax of scores, of which the most likely is taken
 
 Single = NDArray[np.float32]
@@ -75,7 +75,7 @@ def fit_kernels(series: Single) -> Kernels:
         shares = ((at * n_thresholds * 84 + np.arange(84 * n_thresholds) + 1) * _GOLDEN % 1.0).reshape(84, -1)
         thresholds.append(np.stack([np.quantile(row, share) for row, share in zip(own, shares, strict=True)]))
         channels.append(chosen)
-    return Kernels(dilations, tuple(channels), tuple(each.astype(np.float32) for each in thresholds))
+    return Kernels(dilations, tuple(channels), tuple((each + _TIE).astype(np.float32) for each in thresholds))
 
 
 def _convolved(sums: Single, dilation: int) -> Single:
