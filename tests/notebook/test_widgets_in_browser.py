@@ -107,6 +107,19 @@ def test_a_goal_is_dragged_and_read_in_python(show):
     assert again.widget.goal[0] > primitives.goals[1, 0] + 1
 
 
+def test_the_answer_is_whole_beside_its_example(show):
+    cell = show(Move(kineme.DMP().learn(demonstrations()[[0, 3]])), width=1000)
+    cell.frame.get_by_role("button", name="GShape").click()
+    lines = """(text) => {
+      const words = document.createRange();
+      document.getElementById("verdict").textContent = text;
+      words.selectNodeContents(document.getElementById("verdict"));
+      return words.getClientRects().length;
+    }"""
+    wait_until(cell.frame, "!document.getElementById('nearest').hidden")
+    assert [cell.frame.evaluate(lines, text) for text in ("GShape", "Unknown")] == [1, 1]
+
+
 def test_a_goal_that_python_sets_is_shown(show):
     cell = show(Move(kineme.DMP().learn(demonstrations()[[0, 3]])))
     cell.frame.get_by_role("button", name="GShape").click()

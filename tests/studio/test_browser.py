@@ -29,7 +29,7 @@ from browser_samples import (
     show,
     wait_for_text,
 )  # fmt: skip
-from studio_samples import ROOT, Running, Served, running
+from studio_samples import ROOT, Running, Served, drawing, running
 
 import kineme
 from browsing import wait_until
@@ -242,6 +242,17 @@ def test_two_tabs_show_the_same_library_and_undo_takes_back(opened, studio, tmp_
     assert first.locator(".toast.failed", has_text="does not hold").count() == 0
 
 
+def test_the_same_message_is_shown_once_and_three_at_most(opened, studio, folder):
+    page = opened(studio(folder))
+    said = """async (words) => {
+      const { say } = await import("/parts/toasts.js");
+      for (const text of words.split(" ")) say(text);
+      return [...document.querySelectorAll(".toast p")].map((toast) => toast.textContent).join(" ");
+    }"""
+    assert page.evaluate(said, "again again other again") == "other again"
+    assert page.evaluate(said, "third fourth") == "again third fourth"
+
+
 #: How many movements are listed where more of them are asked for while the first are under way.
 LOADED_TWICE = """async () => {
   const { Members } = await import("/library/members.js");
@@ -268,6 +279,16 @@ def test_two_chosen_movements_are_compared_and_names_that_are_mixed_up_counted(o
     page.click("#confusion summary")
     wait_until(page, "document.getElementById('confusion-text').textContent.includes('of 12 movements right')")
     assert page.locator("#confusion-table .right").all_inner_texts() == ["3"] * 4
+
+
+def test_a_long_name_leaves_room_for_the_table_of_names_that_are_mixed_up(opened, studio, folder):
+    with kineme.ActionLibrary(folder) as library:
+        library.learn([kineme.Trajectory(*drawing(9, seed=k)) for k in (0, 1)], ["long_" * 30] * 2)
+    page = opened(studio(folder), "library")
+    page.click("#confusion summary")
+    wait_until(page, "document.querySelectorAll('#confusion-table .right').length === 5")
+    assert page.locator("#confusion-table tr").first.bounding_box()["height"] < 220
+    assert page.locator("#confusion-table th[scope=row]").last.bounding_box()["width"] < 300
 
 
 def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studio, tmp_path):

@@ -173,6 +173,17 @@ def test_a_scribble_is_unknown_and_a_dot_is_asked_again(opened):
     assert "too short" in page.locator("#verdict-note").inner_text()
 
 
+def test_words_of_the_advanced_choices_are_whole_on_a_phone(opened):
+    page = opened(width=390)
+    page.click("#how summary")
+    lines = """() => {
+      const words = document.createRange();
+      words.selectNodeContents(document.querySelector("#how label").firstChild);
+      return words.getClientRects().length;
+    }"""
+    assert page.evaluate(lines) == 1
+
+
 def test_names_are_text_and_what_is_saved_is_what_is_shown(opened):
     page = opened()
     assert page.locator("#symbols img").count() == 0

@@ -145,6 +145,28 @@ def test_annotations_are_added_renamed_moved_removed_undone_and_exported_by_the_
     assert page.evaluate(SPANS) == 0
 
 
+def test_a_time_that_is_typed_stays_in_the_recording_and_on_its_side_of_the_other(opened):
+    page = opened()
+    page.set_input_files("#file", _file("drawn.csv", 0, heads="t,x,y", times=True))
+    wait_for_text(page, "#recording-name", "drawn.csv")
+    end = float(page.inner_text("#playhead-text").split(" of ")[1].removesuffix(" s"))
+    page.click("#add-span")
+    shown = []
+    for part, text in (("begin", "1"), ("end", "0.2"), ("end", "900"), ("begin", "-3"), ("begin", "0.5"), ("end", "")):
+        page.fill(f"[data-key='span 0 {part}']", text)
+        page.keyboard.press("Tab")
+        shown.append([page.input_value(f"[data-key='span 0 {part}']") for part in ("begin", "end")])
+    last = f"{end:.2f}"
+    assert shown == [
+        ["1.00", last],
+        ["1.00", "1.02"],
+        ["1.00", last],
+        ["0.00", last],
+        ["0.50", last],
+        ["0.50", last],
+    ]
+
+
 def test_a_finger_drags_an_edge_and_the_shape_follows(opened):
     page = opened(width=390, height=844, has_touch=True)
     page.set_input_files("#file", _file("drawn.csv", 0, 2, heads="t,x,y", times=True))

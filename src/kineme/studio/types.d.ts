@@ -286,6 +286,7 @@ interface Shape {
 }
 
 interface TimelinePage {
+  timeline: { moveEdge(which: "begin" | "end", time: number): void };
   choose(k: number): void;
   /** By the person. */
   changed(): void;

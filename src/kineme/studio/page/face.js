@@ -251,7 +251,7 @@ function start() {
     if (!state.held && !state.stroke && state.drags)
       canvas.classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
   });
-  canvas.addEventListener("keydown", key);
+  canvas.onkeydown = key;
   byId("clear").onclick = () => become({});
   byId("play").onclick = play;
   byId("drag").onclick = startDragging;

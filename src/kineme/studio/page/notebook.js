@@ -26,7 +26,7 @@ export default {
     const looks = new MutationObserver(tell);
     for (const element of [document.documentElement, document.body]) looks.observe(element, { attributes: true });
     window.addEventListener("message", hear);
-    frame.addEventListener("load", tell);
+    frame.onload = tell;
     model.on("change:drawn", tell);
     model.on("change:moved", tellMoved);
     el.append(frame);

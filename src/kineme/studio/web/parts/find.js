@@ -4,7 +4,7 @@ const MANY = 12;
 
 /** Show what is found whenever the field has changed; Enter presses the first. */
 export function startFinding(field, changed, first) {
-  field.addEventListener("input", changed);
+  field.oninput = changed;
   field.addEventListener("keydown", (event) => event.key === "Enter" && first()?.click());
 }
 

@@ -13,11 +13,13 @@ export function say(text, { undo = null, failed = false } = {}) {
   };
   const look = failed ? { class: "toast failed", role: "alert" } : "toast";
   const toast = make("div", look, make("p", {}, text), button(undo ? "Undo" : "Close", act));
+  const shown = byId("toasts").children;
+  for (const old of shown) if (old.textContent === toast.textContent) old.remove();
   byId("toasts").append(toast);
-  while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();
+  if (shown.length > 3) shown[0].remove();
   let timer = setTimeout(close, failed ? 2 * STAYS : STAYS);
   for (const event of ["pointerenter", "focusin"]) toast.addEventListener(event, () => clearTimeout(timer));
-  toast.addEventListener("pointerleave", () => (timer = setTimeout(close, STAYS)));
+  toast.onpointerleave = () => (timer = setTimeout(close, STAYS));
   return close;
 }
 

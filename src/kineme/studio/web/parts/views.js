@@ -43,8 +43,8 @@ function step(event) {
 
 export function startViews() {
   for (const view of VIEWS) byId(`tab-${view}`).onclick = () => show(view);
-  document.querySelector(".tabs").addEventListener("keydown", step);
+  document.querySelector(".tabs").onkeydown = step;
   for (const button of document.querySelectorAll("[data-view]")) button.onclick = () => show(button.dataset.view, true);
-  window.addEventListener("hashchange", () => show(location.hash.slice(1)));
+  window.onhashchange = () => show(location.hash.slice(1));
   show(VIEWS.includes(location.hash.slice(1)) ? location.hash.slice(1) : "draw");
 }

@@ -13,8 +13,8 @@ export function showSpans(spans, chosen, page) {
     const onfocus = () => page.choose(k);
     const field = (which, words, options) => {
       const onchange = ({ target }) => {
-        const value = which === "label" ? target.value.trim() || null : target.valueAsNumber;
-        if (!Number.isNaN(value)) Object.assign(span, { [which]: value, ...BY_HAND });
+        if (which === "label") Object.assign(span, { label: target.value.trim() || null, ...BY_HAND });
+        else if (target.value) page.timeline.moveEdge(which, target.valueAsNumber);
         page.changed();
       };
       const name = { "aria-label": `${words} of span ${k + 1}`, "data-key": `span ${k} ${words.toLowerCase()}` };
