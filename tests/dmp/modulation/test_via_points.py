@@ -329,7 +329,7 @@ class TestRefusals:
         ids=["near the start", "near each other", "velocity"],
     )
     def test_a_change_that_leads_far_away_is_said(self, learned, asked):
-        with pytest.warns(ExtrapolationWarning, match=r"1 of 1 movements are led far away .*: movement 0 by \d"):
+        with pytest.warns(ExtrapolationWarning, match=r"1 of 1 movements are led .*: movement 0, \S+ large, by \d"):
             learned[0].rollout(**asked)
 
     def test_a_controller_takes_points_of_one_movement(self, learned):

@@ -114,8 +114,8 @@ def warn_changed(
     elif wide.any():
         i = int(np.argmax(np.where(wide, farthest / extents, 0.0)))
         message = (
-            f"{wide.sum()} of {len(wide)} movements are led far away by their via points or end velocity: movement {i} "
-            f"by {farthest[i]:.3g}{unit}, which is {extents[i]:.3g}{unit} large; different places at almost the same "
+            f"{wide.sum()} of {len(wide)} movements are led far away by their via points or end velocity: movement {i}"
+            f", {extents[i]:.3g}{unit} large, by {farthest[i]:.3g}{unit}; different places at almost the same "
             "time, or close to the start or the end, need high velocities: move their times apart, or ask for a lower "
             "velocity"
         )
