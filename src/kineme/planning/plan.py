@@ -189,7 +189,10 @@ def plan_to_dict(plan: Plan) -> dict[str, Any]:
     """Return a plan with its problem and domain as plain data that JSON can hold; `plan_from_dict` reads it."""
     problem = plan.problem
     return {
-        **{"format": FORMAT, "version": VERSION, "planner": plan.planner, "duration": plan.duration},
+        "format": FORMAT,
+        "version": VERSION,
+        "planner": plan.planner,
+        "duration": plan.duration,
         "steps": [step._asdict() | {"start": [*step.start], "goal": [*step.goal]} for step in plan.steps],
         "goal": [{"fact": [*goal.fact], "value": goal.value} for goal in problem.goal],
         "places": {name: where.tolist() for name, where in problem.places.items()},

@@ -73,23 +73,17 @@ class NearestProfiled(NearestEach):
     The profile is the features of random convolutions, `convolutions.transform`, centered at the mean of the references
     and of length 1: it tells which details a movement has, wherever they are. So it is for what is never rotated, and
     whose parts may come in another order or number, as those of signals and of sensors.
-
-    Attributes
-    ----------
-    kernels : Kernels
-    center : ndarray of shape (f,)
-    profiles : ndarray of shape (m, f)
-    width : float
     """
 
     kernels: Kernels = field(repr=False)
-    center: Array = field(repr=False)
-    profiles: Array = field(repr=False)
+    center: Array = field(repr=False)  # (f,)
+    profiles: Array = field(repr=False)  # (m, f)
     width: float
 
     def scores(self, compared: Compared) -> Array:
         """Return the logarithm of the average of both, (n, C)."""
-        cosines = profiles_of(compared.described, self.kernels, self.center) @ self.profiles.T
+        features = transform(series_of(compared.described), self.kernels)
+        cosines = profiles_of(features, self.center) @ self.profiles.T
         nearest = np.maximum.reduceat(cosines, compared.references.first, axis=1)
         by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
         return np.logaddexp(np.log(1.0 - PROFILED) + compared.nearest_each, np.log(PROFILED) + by_profile)
@@ -174,20 +168,22 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
     return SupportVectors(similarity, model)
 
 
-def profiles_of(described: Described, kernels: Kernels, center: Array) -> Array:
+def profiles_of(features: Array, center: Array) -> Array:
     """Return features of random convolutions less their center, at length 1, (n, f)."""
-    features = transform(series_of(described), kernels) - center
-    return np.asarray(features / np.maximum(np.linalg.norm(features, axis=1, keepdims=True), _NO_PROFILE))
+    away = features - center
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _NO_PROFILE))
 
 
-def fit_profiled(comparison: Comparison, references: References) -> NearestEach:
+def fit_profiled(references: References) -> NearestEach:
     """Return the kernels with profiles of the references; the width is that of any representation, see `SHARE`.
 
     Without profiles where most have a copy in another class, which leaves a width of rounding, or there is one class.
     """
-    kernels = fit_kernels(series_of(references.described))
-    center = transform(series_of(references.described), kernels).mean(axis=0)
-    profiles = profiles_of(references.described, kernels, center)
+    series = series_of(references.described)
+    kernels = fit_kernels(series)
+    features = transform(series, kernels)
+    center = features.mean(axis=0)
+    profiles = profiles_of(features, center)
     cosines = profiles @ profiles.T
     cosines[references.labels[:, None] == references.labels] = -np.inf
     apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
@@ -207,13 +203,12 @@ def fit_best(comparison: Comparison, references: References) -> Classifier:
     n_classes = len(references.classes)
     if not able or n_classes < 2 or len(references) > MOST:
         return NearestEach()
+    if references.counts.min() >= FEWEST and (by_kernels := _recognized_left_out(comparison, references)) < _ENOUGH:
+        fitted, by_convolutions = fit_convolutions(comparison, references)
+        if by_convolutions >= by_kernels + _AHEAD:
+            return fitted
     profiled = not rotated and comparison.n_dims not in (2, 3) and comparison.mean == "arithmetic"
-    by_nearest = fit_profiled(comparison, references) if profiled else NearestEach()
-    by_kernels = 1.0 if references.counts.min() < FEWEST else _recognized_left_out(comparison, references)
-    if by_kernels >= _ENOUGH:
-        return by_nearest
-    fitted, by_convolutions = fit_convolutions(comparison, references)
-    return fitted if by_convolutions >= by_kernels + _AHEAD else by_nearest
+    return fit_profiled(references) if profiled else NearestEach()
 
 
 def _recognized_left_out(comparison: Comparison, references: References) -> float:

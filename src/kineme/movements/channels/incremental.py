@@ -86,9 +86,8 @@ def _part_of(channel: Channel, lever: float) -> Callable[[Array], Array]:
     if channel.kind == "orientation":
         return _Orientation(channel, lever).take
     if channel.kind == "angle":
-        period = coordinates.period_of_channel(
-            channel, np.full(1, np.inf)
-        )  # of one that says no period nothing is unwrapped
+        # Of one that says no period nothing is unwrapped.
+        period = coordinates.period_of_channel(channel, np.full(1, np.inf))
         if np.isfinite(period):
             return _Angle(period).take
     n_coordinates = len(channel.coordinates)  # none of a discrete one
