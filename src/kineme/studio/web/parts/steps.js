@@ -1,6 +1,6 @@
 // What was changed, to go back and forth step by step.
 
-const KEPT = 200;
+const MOST = 200;
 
 export class Steps {
   constructor() {
@@ -13,7 +13,7 @@ export class Steps {
     const now = JSON.stringify(state);
     if (now === this.states[this.at]) return;
     this.states.splice(this.at + 1, Infinity, now);
-    if (this.states.length > KEPT) this.states.shift();
+    if (this.states.length > MOST) this.states.shift();
     this.at = this.states.length - 1;
   }
 
