@@ -8,7 +8,7 @@ from sklearn.linear_model import Ridge, RidgeCV
 
 import kineme
 from kineme.errors import SpecificationError
-from kineme.recognition.classifiers import NearestEach, NearestProfiled, profiles_of
+from kineme.recognition.classifiers import NearestEach, NearestProfiled, _profiles
 from kineme.recognition.convolutions import (
     _ALPHAS,
     Convolutions,
@@ -178,7 +178,7 @@ def test_profiles_are_a_quarter_of_the_score():
     recognizer = kineme.Recognizer().fit(shown)
     kernels = kineme.Recognizer(classifier="nearest-each").fit(shown).decision_function(asked)
     classifier, labels = recognizer.classifier_, np.asarray(recognizer.demonstrations_.labels)
-    profiles = profiles_of(transform(series_of(recognizer.describe(asked)), classifier.kernels), classifier.center)
+    profiles = _profiles(transform(series_of(recognizer.describe(asked)), classifier.kernels), classifier.center)
     np.testing.assert_allclose(np.linalg.norm(profiles, axis=1), 1.0)
     squares = ((profiles[:, None] - classifier.profiles) ** 2).sum(axis=2)
     nearest = np.stack([squares[:, labels == label].min(axis=1) for label in recognizer.classes_], axis=1)
@@ -240,7 +240,7 @@ def test_held_values_and_still_columns_have_the_same_profile_at_any_noise_of_a_s
     recognizer = kineme.Recognizer().fit(held, np.arange(8) // 2)
     classifier = recognizer.classifier_
     noisy = [movement + 1e-6 * rng.normal(size=movement.shape) for movement in held]
-    profiles = profiles_of(transform(series_of(recognizer.describe(noisy)), classifier.kernels), classifier.center)
+    profiles = _profiles(transform(series_of(recognizer.describe(noisy)), classifier.kernels), classifier.center)
     np.testing.assert_allclose((profiles * classifier.profiles).sum(axis=1), 1.0, atol=0.003)
 
 

@@ -83,7 +83,7 @@ class NearestProfiled(NearestEach):
     def scores(self, compared: Compared) -> Array:
         """Return the logarithm of the average of both, (n, C)."""
         features = transform(series_of(compared.described), self.kernels)
-        cosines = profiles_of(features, self.center) @ self.profiles.T
+        cosines = _profiles(features, self.center) @ self.profiles.T
         nearest = np.maximum.reduceat(cosines, compared.references.first, axis=1)
         by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
         return np.logaddexp(np.log(1.0 - PROFILED) + compared.nearest_each, np.log(PROFILED) + by_profile)
@@ -168,7 +168,7 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
     return SupportVectors(similarity, model)
 
 
-def profiles_of(features: Array, center: Array) -> Array:
+def _profiles(features: Array, center: Array) -> Array:
     """Return features of random convolutions less their center, at length 1, (n, f)."""
     away = features - center
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _NO_PROFILE))
@@ -183,7 +183,7 @@ def fit_profiled(references: References) -> NearestEach:
     kernels = fit_kernels(series)
     features = transform(series, kernels)
     center = features.mean(axis=0)
-    profiles = profiles_of(features, center)
+    profiles = _profiles(features, center)
     cosines = profiles @ profiles.T
     cosines[references.labels[:, None] == references.labels] = -np.inf
     apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
