@@ -25,16 +25,19 @@ from bench.people import recorded
 from bench.rows import Row
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.answer import fit_known_classes
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, fit_best
 from kineme.recognition.conformal import EXPONENT, LEAST, class_probabilities, distances
 from kineme.similarity.comparison import References
 from kineme.similarity.describe import Described, feature_rows, prepare
-from kineme.similarity.scores import nearest, nearest_each, score
+from kineme.similarity.scores import nearest, score
 from kineme.similarity.specification import ComparisonSpecification
 from kineme_experiments.evaluation.conditions import TOGETHER
 
 ERROR_RATE = 0.05
 SHOWN = (1, 2, 4, 8)
 N_BINS = 10
+#: What is said of when -> numbers of demonstrations of each class: confidence is fitted to three or more of them.
+FITTED = {"": (3, 4, 8), ", 1 shown": (1,)}
 #: Beyond what the recognizer is made for, so that one answer in ten is wrong.
 SEVERELY = Perturbation(1.0, 1.0, math.radians(40), 0.7, 0.05)
 _SPECIFICATION = ComparisonSpecification()
@@ -74,6 +77,7 @@ class Asked(NamedTuple):
     truth: NDArray[np.intp]
     novelty: tuple[NDArray[np.float64], NDArray[np.float64]]
     rejected: tuple[float, float]
+    confidence: NDArray[np.float64]  # of the most similar class of each known movement
     exponent: float
 
 
@@ -85,7 +89,7 @@ def measure(quick: bool) -> list[Row]:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
             fewest = np.unique(one.labels + one.people, return_counts=True)[1].min()
             for n_shown in SHOWN:
-                if n_shown < fewest:
+                if others or n_shown < fewest:  # of oneself, some are left to ask for
                     asked = [ask(one, split, others) for split in splits(one, n_shown, others, draws)]
                     rows += open_set_rows(f"{_where(one, others)}, {n_shown} shown", asked, n_shown)
     return rows + reliability_rows(draws)
@@ -135,22 +139,29 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
     references = References.of(one.demos[shown], one.described.take(shown), one.labels[shown])
     groups = np.unique(one.people[shown], return_inverse=True)[1] if grouped else None
     recognizer = fit_known_classes(_SPECIFICATION, references, groups=groups)
+    classifier, calibration = fit_best(recognizer.comparison, recognizer.references, groups), recognizer.calibration
     truth = np.searchsorted(references.classes, one.labels[split.known])
     logs, novelty, rejected = [], [], []
     for asked in (split.known, split.unknown):
         compared = recognizer.comparison, recognizer.references, one.described.take(asked)
-        found, similar = score(*compared, nearest, nearest_each)
-        p = recognizer.calibration.known_p_values(found, ERROR_RATE)
+        found, similar = score(*compared, nearest, classifier.scores)
+        p = calibration.known_p_values(found, ERROR_RATE)
         logs.append(similar)
-        novelty.append(recognizer.calibration.scores(found).min(axis=1))
+        novelty.append(calibration.scores(found).min(axis=1))
         rejected.append(float(np.mean(p <= ERROR_RATE)) if len(p) else math.nan)
+    probabilities = (
+        classifier.probabilities(logs[0])
+        if isinstance(classifier, BY_CONVOLUTIONS)
+        else class_probabilities(logs[0], calibration.exponent)
+    )
     return Asked(
         logs[0].argmax(axis=1) == truth,
         logs[0],
         truth,
         (novelty[0], novelty[1]),
         (rejected[0], rejected[1]),
-        recognizer.calibration.exponent,
+        probabilities.max(axis=1),
+        calibration.exponent,
     )
 
 
@@ -180,20 +191,21 @@ def open_set_rows(what: str, asked: list[Asked], n_shown: int) -> list[Row]:
 def reliability_rows(draws: int) -> list[Row]:
     """How far confidence is from the share of right answers, with all classes known."""
     sets = [*perturbed_lasa({"LASA, strongly": TOGETHER[2], "LASA, severely": SEVERELY}), *people()]
-    rows, fitted = [], []
+    rows = []
     for one in sets:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
-            found = [ask(one, s, others) for n in (1, 2, 4) for s in splits(one, n, others, draws, 1.0)]
-            right = np.concatenate([one.right for one in found]) if found else np.empty(0)
-            if not len(right):  # no movement is left to ask for
-                continue
-            confidence = np.concatenate(
-                [class_probabilities(each.similar, each.exponent).max(axis=1) for each in found]
-            )
-            fitted.append(exponent(found))
-            details = reliability(confidence, right) | {"accuracy": float(right.mean()), "exponent": fitted[-1]}
-            what = f"{_where(one, others)}: expected calibration error"
-            rows.append(Row(what, "", details["error"], target=("<=", 0.05), details=details))
+            for when, shown in FITTED.items():
+                found = [ask(one, s, others) for n in shown for s in splits(one, n, others, draws, 1.0)]
+                right = np.concatenate([one.right for one in found]) if found else np.empty(0)
+                if not len(right):  # no movement is left to ask for
+                    continue
+                confidence = np.concatenate([each.confidence for each in found])
+                details = reliability(confidence, right)
+                details |= {"accuracy": float(right.mean()), "confidence": float(confidence.mean())}
+                if shown == (1,):
+                    details["exponent"] = exponent(found)
+                what = f"{_where(one, others)}{when}: expected calibration error"
+                rows.append(Row(what, "", details["error"], target=("<=", 0.05), details=details))
     return rows
 
 

@@ -81,7 +81,6 @@ EXEMPT = {
     "similarity.bounds.log_bounds": "of pairs; see test_bounds.py",
     "similarity.comparison.StoredReferences.bounds": "of pairs; see test_bounds.py",
     "recognition.outliers.find_outliers": "compares each with the others of its label",
-    "recognition.convolutions.left_out_values": "values of each row by the others",
     "recognition.early.evidence.earliness": "a score of the whole set",
     "recognition.early.live_state.LiveState.certainty": "of one stream",
     "recognition.early.live_state.LiveState.in_words": "of one stream",

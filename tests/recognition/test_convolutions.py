@@ -8,7 +8,8 @@ from sklearn.linear_model import Ridge, RidgeCV
 
 import kineme
 from kineme.errors import SpecificationError
-from kineme.recognition.classifiers import NearestEach, NearestProfiled, _profiles
+from kineme.recognition.classifiers import LogarithmicPool, NearestEach, NearestProfiled, _profiles
+from kineme.recognition.conformal import class_probabilities, distances, fit_exponent
 from kineme.recognition.convolutions import (
     _ALPHAS,
     Convolutions,
@@ -86,7 +87,8 @@ def test_they_join_where_they_recognize_more_of_what_is_left_out():
     """The place of a tremble says nothing and its frequency all: no path is near another of its class."""
     shown, fresh = draw_trembles(16, seed=1), draw_trembles(20, seed=2)
     recognizer = kineme.Recognizer().fit(shown)
-    assert isinstance(recognizer.classifier_, Convolutions)
+    assert isinstance(recognizer.classifier_, LogarithmicPool)
+    assert recognizer.classifier_.share == 0.5  # they recognize clearly more
     labels = np.asarray(fresh.labels)
     kernels = kineme.Recognizer(classifier="nearest-each").fit(shown)
     assert recognizer.score(fresh) >= kernels.score(fresh) + 0.1
@@ -121,17 +123,34 @@ def test_an_explanation_says_that_the_kernels_chose_its_examples():
     assert "(ranked with random convolutions; example and shares are those of the kernels)" in explained.in_words
     assert "random convolutions" in explained.plot().get_suptitle()
     assert len(repr(explained)) < 300
-    assert repr(recognizer.classifier_).startswith("Convolutions(sharpness=")
-    assert len(repr(recognizer.classifier_)) < 60
+    assert repr(recognizer.classifier_).startswith(
+        "LogarithmicPool(nearest=NearestEach(), convolutions=Convolutions(sharpness="
+    )
+    assert len(repr(recognizer.classifier_)) < 200
 
 
-def test_with_few_demonstrations_or_where_kernels_suffice_they_do_not():
-    assert isinstance(kineme.Recognizer().fit(draw_trembles(7, seed=3)).classifier_, NearestEach)
+def test_with_one_demonstration_or_where_kernels_suffice_they_do_not():
+    assert isinstance(kineme.Recognizer().fit(draw_trembles(1, seed=3)).classifier_, NearestEach)
+    assert isinstance(kineme.Recognizer().fit(draw_trembles(2, seed=3)).classifier_, LogarithmicPool)
+    assert isinstance(kineme.Recognizer().fit(draw_trembles(2, seed=3)[1:]).classifier_, NearestEach)
     demos = kineme.load_lasa(["CShape", "NShape"])
     twice = kineme.Demonstrations.from_arrays(
         [demo.positions for demo in demos] + [1.1 * demo.positions for demo in demos], [*demos.labels, *demos.labels]
     )
     assert isinstance(kineme.Recognizer().fit(twice).classifier_, NearestEach)
+
+
+def test_points_that_turn_together_have_them_also_where_kernels_suffice():
+    """Two hands: of other people, a pool recognizes more than the kernels, which recognize all that is left out."""
+    shown, asked = (draw_paths(each, each, noise=0.05, n_classes=3) for each in (8, 4))
+    hands, others = (
+        kineme.Demonstrations.from_arrays([np.hstack((one.positions, -one.positions)) for one in demos], demos.labels)
+        for demos in (shown, asked)
+    )
+    assert isinstance(kineme.Recognizer().fit(hands).classifier_, NearestProfiled)
+    recognizer = kineme.Recognizer(points=2).fit(hands)
+    assert isinstance(recognizer.classifier_, LogarithmicPool)
+    assert recognizer.score(others) == 1
 
 
 @pytest.mark.parametrize("n_dims", [1, 3, 5])
@@ -140,7 +159,79 @@ def test_the_number_of_columns_does_not_matter(n_dims):
     plane = draw_trembles(16, seed=7)
     columns = [[0], [0, 1, 0], [0, 1, 1, 0, 1]][(1, 3, 5).index(n_dims)]
     demos = kineme.Demonstrations.from_arrays([demo.positions[:, columns] for demo in plane], plane.labels)
-    assert isinstance(kineme.Recognizer().fit(demos).classifier_, Convolutions)
+    assert isinstance(kineme.Recognizer().fit(demos).classifier_, LogarithmicPool)
+
+
+def draw_paths(each, seed, noise=0.5, n_classes=6):
+    """Paths of a class that vary about its own, too much to be always recognized."""
+    rng, u = np.random.default_rng(seed), np.linspace(0, 1, 60)[:, None]
+    waves = np.sin(np.pi * u * np.arange(1, 5))
+    own = np.random.default_rng(2).normal(size=(n_classes, 4, 2))
+    arrays = [waves @ (path + noise * rng.normal(size=path.shape)) for path in own for _ in range(each)]
+    return kineme.Demonstrations.from_arrays(arrays, [str(k // each) for k in range(len(arrays))])
+
+
+def test_the_pool_multiplies_powers_of_both_probabilities_where_the_kernels_are_not_sure():
+    shown, asked = (draw_paths(each, each) for each in (10, 12))
+    recognizer = kineme.Recognizer().fit(shown)
+    pool = recognizer.classifier_
+    assert pool.share == 0.25
+    alone = kineme.Recognizer(classifier="nearest-each").fit(shown)
+    p = class_probabilities(alone._scores(asked), pool.exponent)
+    q = kineme.Recognizer(classifier="convolutions").fit(shown).predict_proba(asked)
+    product = p**0.75 * q**0.25
+    expected = np.where(p.max(axis=1, keepdims=True) > 0.99, p, product / product.sum(axis=1, keepdims=True))
+    assert 10 < (p.max(axis=1) > 0.99).sum() < 62
+    np.testing.assert_allclose(recognizer.predict_proba(asked), expected, atol=1e-6)
+    one_by_one = np.concatenate([recognizer.predict_proba(asked[i : i + 1]) for i in range(0, len(asked), 7)])
+    np.testing.assert_allclose(one_by_one, expected[::7], atol=1e-6)
+    best = p[np.arange(72), np.searchsorted(alone.classes_, alone.predict(asked))]
+    np.testing.assert_allclose(best, p.max(axis=1))
+
+
+def test_the_exponent_of_the_pool_is_that_by_which_demonstrations_left_out_are_most_likely():
+    """As `fit_exponent` finds it by fits without each demonstration."""
+    shown = draw_paths(8, seed=3, noise=0.7, n_classes=3)
+    recognizer = kineme.Recognizer().fit(shown)
+    comparison, references = recognizer.comparison_, recognizer.references_
+    logs = comparison.similarity.logs(references.described, references.described)
+    logs[:, np.arange(24), np.arange(24)] = -np.inf
+    nearest = np.stack([logs[:, :, 8 * c : 8 * c + 8].max(axis=2) for c in range(3)], axis=2)
+    scores = np.log(np.exp(nearest).mean(axis=0))
+    away, owners = distances(scores), np.repeat(np.arange(3), 8)
+    away[np.arange(24), owners] *= (7 / 8) ** (1 / 8)
+    expected = fit_exponent(away, owners)
+    assert recognizer.classifier_.exponent == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("groups", [None, "who"])
+def test_the_exponent_of_profiles_is_fitted_to_scores_with_profiles(groups):
+    """Each demonstration is left out, or with all of its group."""
+    shown = columns_of(draw_trembles(4, seed=3), 5)
+    who = np.arange(12) // 2 if groups else None
+    recognizer = kineme.Recognizer().fit(shown, groups=who)
+    classifier = recognizer.classifier_.nearest
+    kernels = kineme.Recognizer(classifier="nearest-each").fit(shown)
+    away = np.empty((12, 3))
+    for i in range(12):
+        hidden = [i] if who is None else np.flatnonzero(who == who[i])
+        logs = kernels.comparison_.similarity.logs(kernels.describe(shown[i : i + 1]), kernels.references_.described)
+        logs[:, :, hidden] = -np.inf
+        by_kernels = np.log(np.exp(logs.reshape(-1, 3, 4).max(axis=2)).mean(axis=0))
+        cosines = classifier.profiles @ classifier.profiles[i]
+        cosines[hidden] = -np.inf
+        by_profiles = (cosines.reshape(3, 4).max(axis=1) - 1) / classifier.width**2
+        away[i] = distances(np.log(0.75 * np.exp(by_kernels) + 0.25 * np.exp(by_profiles)))
+        away[i, i // 4] *= ((4 - len(hidden)) / 4) ** (1 / 8)
+    expected = fit_exponent(away, np.repeat(np.arange(3), 4), 8.0)
+    assert classifier.exponent == pytest.approx(expected, rel=1e-4)
+    assert recognizer.classifier_.exponent == classifier.exponent
+    once = kineme.Recognizer().fit(shown[::4])
+    assert once.classifier_.exponent == 8.0
+    expected = class_probabilities(once._scores(shown), 8.0)
+    np.testing.assert_allclose(once.predict_proba(shown), expected)
+    given = once.recognize(shown[1])
+    np.testing.assert_allclose([given.probabilities[label] for label in once.classes_], expected[1], rtol=1e-5)
 
 
 def columns_of(demos, n_dims):
@@ -174,7 +265,7 @@ def test_profiles_recognize_what_is_made_in_another_order():
 
 
 def test_profiles_are_a_quarter_of_the_score():
-    shown, asked = (columns_of(draw_trembles(each, seed=each), 5) for each in (3, 4))
+    shown, asked = (columns_of(draw_trembles(each, seed=each), 5)[cut:] for each, cut in ((3, 2), (4, 0)))
     recognizer = kineme.Recognizer().fit(shown)
     kernels = kineme.Recognizer(classifier="nearest-each").fit(shown).decision_function(asked)
     classifier, labels = recognizer.classifier_, np.asarray(recognizer.demonstrations_.labels)
@@ -197,8 +288,19 @@ def test_with_profiles_one_class_is_named_everywhere():
         np.testing.assert_allclose([answer.probabilities[name] for name in recognizer.classes_], row)
     explained = recognizer.recognize(asked[0]).explain()
     assert explained.by_convolutions
-    with pytest.raises(SpecificationError, match="got convolutions, which the page does not have"):
-        snapshot_of_recognizer(recognizer)
+
+
+@pytest.mark.parametrize(("each", "n_dims"), [(1, 5), (3, 2)])
+def test_the_page_answers_by_the_kernels_alone_and_says_so(each, n_dims):
+    shown = columns_of(draw_trembles(each, seed=4), n_dims)
+    recognizer = kineme.Recognizer().fit(shown)
+    assert isinstance(recognizer.classifier_, NearestProfiled | LogarithmicPool)
+    with pytest.warns(UserWarning, match="the page answers by the kernels alone.*classifier='nearest-each'"):
+        snapshot = snapshot_of_recognizer(recognizer)
+    same = snapshot_of_recognizer(kineme.Recognizer(classifier="nearest-each").fit(shown))
+    assert snapshot.header == same.header
+    for name, array in same.arrays.items():
+        np.testing.assert_array_equal(snapshot.arrays[name], array)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +340,7 @@ def test_held_values_and_still_columns_have_the_same_profile_at_any_noise_of_a_s
     levels[:, :, 4:] = 7.3
     held = [np.repeat(own, rng.integers(15, 40, size=6), axis=0) for own in levels]
     recognizer = kineme.Recognizer().fit(held, np.arange(8) // 2)
-    classifier = recognizer.classifier_
+    classifier = recognizer.classifier_.nearest
     noisy = [movement + 1e-6 * rng.normal(size=movement.shape) for movement in held]
     profiles = _profiles(transform(series_of(recognizer.describe(noisy)), classifier.kernels), classifier.center)
     np.testing.assert_allclose((profiles * classifier.profiles).sum(axis=1), 1.0, atol=0.003)

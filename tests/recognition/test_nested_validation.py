@@ -1,4 +1,4 @@
-"""Nested validation in docs/guide/recognition-defaults.md: accuracies of `Recognizer`, and people stay apart."""
+"""Nested validation in docs/guide/recognition-defaults.md: accuracies of kernels of `Recognizer`; people stay apart."""
 
 from __future__ import annotations
 
@@ -36,9 +36,11 @@ def test_accuracies_are_those_of_the_recognizer(nested, of_people):
     expected = {person: [[], []] for person in found}
     demos, labels = of_people.copies[0], of_people.labels
     for _, person, train, test in of_people.splits():
-        expected[person][0].append(Recognizer(weights="own").fit(demos[train]).score(demos[test], labels[test]))
+        kernels = Recognizer(weights="own", classifier="nearest-each").fit(demos[train])
+        expected[person][0].append(kernels.score(demos[test], labels[test]))
         with patch.object(widths, "SHARE", 0.3):
-            other = Recognizer(weights="equal", rotation_prior=RotationPrior(0.3)).fit(demos[train])
+            prior = RotationPrior(0.3)
+            other = Recognizer(weights="equal", rotation_prior=prior, classifier="nearest-each").fit(demos[train])
         expected[person][1].append(other.score(demos[test], labels[test]))
     for person, both in expected.items():
         np.testing.assert_allclose(found[person], np.mean(both, axis=1), atol=1e-9)

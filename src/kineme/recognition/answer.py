@@ -19,7 +19,6 @@ from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike
 from kineme.recognition import explanation
 from kineme.recognition.classifiers import BY_CONVOLUTIONS, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
-from kineme.recognition.convolutions import Convolutions
 from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
@@ -328,7 +327,7 @@ def verdicts_of(
     rows_of: dict[str, list[int]] = {}  # those of one name differ in resolution only
     for r, representation in enumerate(compared.comparison.representations):
         rows_of.setdefault(representation.name, []).append(r)
-    if isinstance(classifier, Convolutions):
+    if isinstance(classifier, BY_CONVOLUTIONS):
         probabilities = classifier.probabilities(scores)
     else:
         similar = scores if isinstance(classifier, NearestEach) else compared.nearest

@@ -3,32 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.recognition.conformal import (
+    DIMENSIONS,
+    EXPONENT,
+    class_probabilities,
+    comparable_groups,
+    distances,
+    fit_exponent,
+    log_class_probabilities,
+)
 from kineme.recognition.convolutions import Convolutions, Kernels, fit_convolutions, fit_kernels, series_of, transform
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import Described
 from kineme.similarity.scores import Classifier, Compared, most_similar
 from kineme.similarity.similarity import SHARE, AveragedSimilarity
-from kineme.similarity.specification import LOG_MEANS
+from kineme.similarity.specification import LOG_MEANS, softmax
 from kineme.validation import Array
 
 _WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-0.8)
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
-#: Fewest demonstrations of each class with which convolutions are considered, and most in all.
-FEWEST, MOST = 8, 1000
+#: Fewest demonstrations of each class with which convolutions join, and most in all.
+FEWEST, MOST = 2, 1000
 _COMPARED = 500  # demonstrations by which the kernels are judged, at most
-#: Share of demonstrations left out that the kernels recognize from which on nothing else is tried, and by how much
-#: more the convolutions must recognize: on five of seven sets of people's movements the kernels are ahead.
-_ENOUGH, _AHEAD = 0.97, 0.01
+#: Share of demonstrations left out that the kernels recognize from which on nothing else is tried. Of other people the
+#: kernels then recognize more, but for points that turn together.
+_ENOUGH = 0.98
+#: Share of the convolutions' probabilities in the pool, and where they recognize so much more of what is left out.
+_SHARE, _SHARE_AHEAD, _AHEAD = 0.25, 0.5, 0.01
+_SURE = 0.99  # probability of a class by the kernels above which the convolutions would hardly change the answer
 #: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
 PROFILED = 0.25
+#: `EXPONENT` of these: at one demonstration, 3 to 10 were most likely on the coordinates of five sets and on exercises.
+#: Written words differ; they are right more often than is said.
+_EXPONENT = 8.0
+_LEAST = 1e-9  # of a probability by convolutions
 _NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
@@ -79,18 +95,63 @@ class NearestProfiled(NearestEach):
     center: Array = field(repr=False)  # (f,)
     profiles: Array = field(repr=False)  # (m, f)
     width: float
+    exponent: float = _EXPONENT  # of `class_probabilities`, fitted to these scores
 
     def scores(self, compared: Compared) -> Array:
         """Return the logarithm of the average of both, (n, C)."""
         features = transform(series_of(compared.described), self.kernels)
-        cosines = _profiles(features, self.center) @ self.profiles.T
-        nearest = np.maximum.reduceat(cosines, compared.references.first, axis=1)
+        return self.with_profiles(compared.nearest_each, _profiles(features, self.center), compared.references)
+
+    def with_profiles(
+        self, by_kernels: Array, profiles: Array, references: References, hidden: NDArray[np.bool_] | None = None
+    ) -> Array:
+        """Return scores (n, C), of `by_kernels` and of profiles (n, f) but for pairs with references hidden (n, m)."""
+        cosines = profiles @ self.profiles.T
+        if hidden is not None:
+            cosines[hidden] = -np.inf
+        nearest = np.maximum.reduceat(cosines, references.first, axis=1)
         by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
-        return np.logaddexp(np.log(1.0 - PROFILED) + compared.nearest_each, np.log(PROFILED) + by_profile)
+        return np.logaddexp(np.log(1.0 - PROFILED) + by_kernels, np.log(PROFILED) + by_profile)
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
         return self.scores(compared).argmax(axis=1)
+
+    def probabilities(self, scores: Array) -> Array:
+        """Return the probability of each class, (n, C)."""
+        return class_probabilities(scores, self.exponent)
+
+
+@dataclass(frozen=True, eq=False)
+class LogarithmicPool(Classifier):
+    """Each class scores ``(1 - s) log p + s log q``: p its probability by the kernels, q that by the convolutions.
+
+    p is `class_probabilities` at the `exponent`, of kernels with profiles or without, and s the `share`. Where one p is
+    above 0.99, the score is log p: most movements then need no convolutions.
+
+    Source: C. Genest, J. Zidek, "Combining probability distributions: a critique and an annotated bibliography",
+    Statistical Science 1, 1986 (the logarithmic opinion pool).
+    """
+
+    nearest: NearestEach
+    convolutions: Convolutions
+    share: float
+    exponent: float
+
+    def scores(self, compared: Compared) -> Array:
+        """Return the logarithms of the pooled probabilities, (n, C), but for a constant of each movement."""
+        scores = log_class_probabilities(self.nearest.scores(compared), self.exponent)
+        unsure = np.flatnonzero(scores.max(axis=1) <= np.log(_SURE))
+        if len(unsure):
+            some = replace(compared, described=compared.described.take(unsure))
+            by_convolutions = self.convolutions.probabilities(self.convolutions.scores(some))
+            pooled = self.share * np.log(np.maximum(by_convolutions, _LEAST))
+            scores[unsure] = (1.0 - self.share) * scores[unsure] + pooled
+        return scores
+
+    def probabilities(self, scores: Array) -> Array:
+        """Return the probability of each class, (n, C)."""
+        return softmax(scores, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +235,7 @@ def _profiles(features: Array, center: Array) -> Array:
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _NO_PROFILE))
 
 
-def fit_profiled(references: References) -> NearestEach:
+def fit_profiled(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> NearestEach:
     """Return the kernels with profiles of the references; the width is that of any representation, see `SHARE`.
 
     Without profiles where most have a copy in another class, which leaves a width of rounding, or there is one class.
@@ -188,14 +249,17 @@ def fit_profiled(references: References) -> NearestEach:
     cosines[references.labels[:, None] == references.labels] = -np.inf
     apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
     width = SHARE * float(np.median(apart))
-    return NearestProfiled(kernels, center, profiles, width) if _SAME < width < np.inf else NearestEach()
+    if not _SAME < width < np.inf:
+        return NearestEach()
+    profiled = NearestProfiled(kernels, center, profiles, width)
+    return replace(profiled, exponent=_exponent(profiled, comparison, references, groups))
 
 
-def fit_best(comparison: Comparison, references: References) -> Classifier:
-    """Return the convolutions where they recognize clearly more of the demonstrations left out, else the kernels.
+def fit_best(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> Classifier:
+    """Return the kernels, of two demonstrations of each class and more pooled with convolutions if they need help.
 
-    Considered from eight demonstrations of each class on, of movements that are compared in detail and not rotated.
-    Signals, and more than three columns that are no points, have profiles beside the kernels, if there are few or many.
+    Convolutions are for movements that are compared in detail and not rotated there. Signals, and more than three
+    columns that are no points, have profiles beside the kernels, if there are few or many.
     """
     pairs, rotated = references.described.pairs, comparison.procrustes.max_angle > 0
     in_detail = pairs is not None and pairs.details is not None and (pairs.upright or not rotated)
@@ -203,26 +267,56 @@ def fit_best(comparison: Comparison, references: References) -> Classifier:
     n_classes = len(references.classes)
     if not able or n_classes < 2 or len(references) > MOST:
         return NearestEach()
-    if references.counts.min() >= FEWEST and (by_kernels := _recognized_left_out(comparison, references)) < _ENOUGH:
-        fitted, by_convolutions = fit_convolutions(comparison, references)
-        if by_convolutions >= by_kernels + _AHEAD:
-            return fitted
     profiled = not rotated and comparison.n_dims not in (2, 3) and comparison.mean == "arithmetic"
-    return fit_profiled(references) if profiled else NearestEach()
+    nearest = fit_profiled(comparison, references, groups) if profiled else NearestEach()
+    if references.counts.min() < FEWEST:
+        return nearest
+    scores, owners, _ = _left_out(NearestEach(), comparison, references, None)
+    by_kernels = float((scores.argmax(axis=1) == owners).mean())
+    if by_kernels >= _ENOUGH and comparison.procrustes.n_points == 1:
+        return nearest
+    convolutions, by_convolutions = fit_convolutions(comparison, references)
+    share = _SHARE_AHEAD if by_convolutions >= by_kernels + _AHEAD else _SHARE
+    if isinstance(nearest, NearestProfiled):
+        return LogarithmicPool(nearest, convolutions, share, nearest.exponent)
+    exponent = _exponent(nearest, comparison, references, groups)
+    return LogarithmicPool(nearest, convolutions, share, exponent)
 
 
-def _recognized_left_out(comparison: Comparison, references: References) -> float:
-    """Return the share of references that the kernels recognize by the others."""
+def _exponent(
+    nearest: NearestEach, comparison: Comparison, references: References, groups: NDArray[np.intp] | None
+) -> float:
+    """Return the exponent by which references are most likely, left out with their group, see `fit_exponent`."""
+    scores, owners, n_others = _left_out(nearest, comparison, references, comparable_groups(groups))
+    away = distances(scores)
+    # As `calibrate` does: with all demonstrations of the class, the nearest would be somewhat nearer.
+    away[np.arange(len(owners)), owners] *= (np.maximum(n_others, 1) / references.counts[owners]) ** (1 / DIMENSIONS)
+    prior = _EXPONENT if isinstance(nearest, NearestProfiled) else EXPONENT
+    return fit_exponent(away[n_others > 0], owners[n_others > 0], prior)
+
+
+def _left_out(
+    nearest: NearestEach, comparison: Comparison, references: References, groups: NDArray[np.intp] | None
+) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+    """Return scores (k, C) of references by those of other groups, -inf without; their classes; numbers of others."""
     chosen = evenly_spaced(len(references), _COMPARED)
+    groups = np.arange(len(references)) if groups is None else groups
+    hidden = groups[chosen, None] == groups
     logs = comparison.similarity.logs(references.described.take(chosen), references.described)
-    logs[:, np.arange(len(chosen)), chosen] = -np.inf
-    scores = LOG_MEANS[comparison.mean](np.maximum.reduceat(logs, references.first, axis=2))
+    logs[:, hidden] = -np.inf
+    each = np.maximum.reduceat(logs, references.first, axis=2)
+    alone = np.logical_and.reduceat(hidden, references.first, axis=1)
+    each[:, alone] = 0.0  # averages of nothing would be NaN
+    scores = np.where(alone, -np.inf, LOG_MEANS[comparison.mean](each))
+    if isinstance(nearest, NearestProfiled):
+        scores = nearest.with_profiles(scores, nearest.profiles[chosen], references, hidden)
     owners = np.searchsorted(references.first, chosen, side="right") - 1
-    return float((scores.argmax(axis=1) == owners).mean())
+    n_others = np.add.reduceat(~hidden, references.first, axis=1)[np.arange(len(chosen)), owners]
+    return scores, owners, n_others
 
 
-#: Those in which random convolutions rank the classes, alone or beside the kernels.
-BY_CONVOLUTIONS = (Convolutions, NearestProfiled)
+#: Those in which random convolutions rank the classes, alone or beside the kernels; they tell probabilities, too.
+BY_CONVOLUTIONS = (Convolutions, LogarithmicPool, NearestProfiled)
 
 #: Name -> what fits the classifier.
 CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {

@@ -349,18 +349,24 @@ def class_probabilities(similar: Array, exponent: float = EXPONENT) -> Array:
     return softmax(_log_odds(distances(similar), exponent), axis=1)
 
 
-def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:
+def log_class_probabilities(similar: Array, exponent: float) -> Array:
+    """Return the logarithms of `class_probabilities`, (n, C), which are finite where these underflow."""
+    logs = _log_odds(distances(similar), exponent)
+    return np.asarray(logs - np.log(np.exp(logs).sum(axis=1, keepdims=True)))
+
+
+def fit_exponent(away: Array, classes: NDArray[np.intp], prior: float = EXPONENT) -> float:
     """Return the exponent by which demonstrations are most likely of their own classes.
 
-    It maximizes ``sum_i log P(c_i) - (log(m / 15) / 0.35)^2 / 2``, each demonstration left out of what it is compared
-    with; the last term is a log-normal prior. Without demonstrations it is 15.
+    It maximizes ``sum_i log P(c_i) - (log(m / prior) / 0.35)^2 / 2``, each demonstration left out of what it is
+    compared with; the last term is a log-normal prior. Without demonstrations it is the `prior`.
 
     - `away` (n, C): distance of each demonstration to the nearest other one of each class; infinite where there is
       none.
     - `classes` (n,): the class of each.
     """
     if not len(away):
-        return EXPONENT
+        return prior
     chosen = evenly_spaced(len(away), _ROWS)
     away, classes = away[chosen], classes[chosen]
     rows = np.arange(len(away))
@@ -368,7 +374,7 @@ def fit_exponent(away: Array, classes: NDArray[np.intp]) -> float:
     def loss(log_exponent: float) -> float:
         logs = _log_odds(away, math.exp(log_exponent))
         likelihood = logs[rows, classes] - np.log(np.exp(logs).sum(axis=1))
-        return 0.5 * ((log_exponent - math.log(EXPONENT)) / _SPREAD) ** 2 - float(likelihood.sum())
+        return 0.5 * ((log_exponent - math.log(prior)) / _SPREAD) ** 2 - float(likelihood.sum())
 
     low, high = (math.log(bound) for bound in _BOUNDS)
     return math.exp(_golden_section(loss, low, high))

@@ -16,9 +16,8 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, is_one, known_classes
-from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_best
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_best
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
-from kineme.recognition.convolutions import Convolutions
 from kineme.reporting.table import to_html
 from kineme.reporting.text import in_markup
 from kineme.runtime.compiled import load_compiled
@@ -73,9 +72,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
         "convolutions" of the path. "auto" is "nearest-each", of signals and of more than three columns that are no
-        points with profiles of random convolutions beside it, see `NearestProfiled`; or from eight demonstrations of
-        each class on "convolutions" where these recognize more of them when they are left out. Whether a movement is
-        known is told by the kernels, and the convolutions then name it: see `kineme.recognition.answer.known_labels`.
+        points with profiles of random convolutions beside it, see `NearestProfiled`; from two demonstrations of each
+        class on both are pooled with "convolutions", see `LogarithmicPool`, unless the kernels recognize practically
+        all that are left out. Whether a movement is known is told by the kernels alone: see
+        `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
         `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
@@ -184,8 +184,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         order = np.argsort(labels, kind="stable")
         numbers = None if groups is None else check_groups(groups, len(demos))[order]
         comparison, references = fit_comparison(specification, demos, labels, self.weights)
-        fit = fit_best if self.classifier == "auto" else CLASSIFIERS[self.classifier]
-        classifier = fit(comparison, references)
+        if self.classifier == "auto":
+            classifier = fit_best(comparison, references, numbers)
+        else:
+            classifier = CLASSIFIERS[self.classifier](comparison, references)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
         self._groups: NDArray[np.intp] | None = numbers
@@ -279,10 +281,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
         `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
         to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates; by "convolutions" one as
-        sharp as makes demonstrations that are left out most likely. `recognize` tells if a movement is known at all.
+        sharp as makes demonstrations that are left out most likely; where convolutions join the kernels, the normalized
+        product of powers of both, see `LogarithmicPool`. `recognize` tells if a movement is known at all.
         """
         scores = self._scores(X)
-        if isinstance(self.classifier_, Convolutions):
+        if isinstance(self.classifier_, BY_CONVOLUTIONS):
             return self.classifier_.probabilities(scores)
         if isinstance(self.classifier_, SupportVectors):
             return softmax(scores, axis=1)
@@ -343,7 +346,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         comparison, references = self._fitted
         calibration = self._calibration
         if calibration is None:
-            self._calibration = calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+            calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+            self._calibration = calibration
         return calibration
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from base64 import b64encode
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import decoder, smoothness_factor, trajectory_regression
 from kineme.dmp.pose.pose_dmp import PosePrimitives
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.kernels.pair_distances import Shapes
 from kineme.kernels.procrustes import Procrustes
 from kineme.library.grounding import prototype_of
@@ -28,7 +28,15 @@ from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, Nearest, NearestEach, Prototype, fit_prototype
+from kineme.recognition.classifiers import (
+    LogarithmicPool,
+    Nearest,
+    NearestEach,
+    NearestProfiled,
+    Prototype,
+    SupportVectors,
+    fit_prototype,
+)
 from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
@@ -204,11 +212,11 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
     if isinstance(classifier, Prototype):
         return {"classifier": "prototype", "medoids": classifier.medoids.tolist()}
     for kind, name in ((NearestEach, "nearest-each"), (Nearest, "nearest")):
-        if isinstance(classifier, kind) and not isinstance(classifier, BY_CONVOLUTIONS):
+        if isinstance(classifier, kind):
             return {"classifier": name}
     raise SpecificationError(
         "expected the classifier to be nearest-each, nearest or prototype, got "
-        f"{'convolutions' if isinstance(classifier, BY_CONVOLUTIONS) else 'svm'}, which the page does not have; "
+        f"{'svm' if isinstance(classifier, SupportVectors) else 'convolutions'}, which the page does not have; "
         "pass classifier='nearest-each'"
     )
 
@@ -340,8 +348,19 @@ def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: 
 def snapshot_of_recognizer(
     recognizer: FittedRecognizer, dmp: DMP | None = None, early: Early | None = None
 ) -> Snapshot:
-    """A fitted recognizer, with a primitive of the medoid of each class; `early` as in `snapshot_of_library`."""
+    """A fitted recognizer, with a primitive of the medoid of each class; `early` as in `snapshot_of_library`.
+
+    Warns where the recognizer adds random convolutions by itself: the page has the kernels alone.
+    """
     classes = known_classes(recognizer)
+    if isinstance(classes.classifier, LogarithmicPool | NearestProfiled):
+        warn(
+            "the page answers by the kernels alone, without the random convolutions that this recognizer adds: some "
+            "answers may differ; make it with classifier='nearest-each' for the same ones",
+            UserWarning,
+            2,
+        )
+        classes = replace(classes, classifier=NearestEach())
     demos = classes.references.all_movements()
     medoids = fit_prototype(classes.comparison, classes.references).medoids
     return _snapshot(classes, (dmp or DMP()).learn(demos[medoids]), early)
