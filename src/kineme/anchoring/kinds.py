@@ -31,15 +31,11 @@ _AXES = 3  # principal axes along which a kind is divided, beside the features t
 
 @dataclass(frozen=True, eq=False)
 class Kinds:
-    """K Gaussians over features of pieces, and what follows what.
+    """K Gaussians over features of pieces, and what follows what."""
 
-    - `means` (K, f), `roots` (K, f, f): means, and lower Cholesky factors of the covariances.
-    - `grammar`: of the kinds in the sequences that they were learned from.
-    """
-
-    means: Array
-    roots: Array
-    grammar: Grammar
+    means: Array  # (K, f)
+    roots: Array  # (K, f, f), lower Cholesky factors of the covariances
+    grammar: Grammar  # of the kinds in the sequences that they were learned from
 
     def __len__(self) -> int:
         return len(self.means)

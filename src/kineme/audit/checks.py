@@ -9,6 +9,7 @@ contradictions; all others say nothing before they are compared with those of ot
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -205,16 +206,10 @@ def still(motion: Motion) -> Measure:
     return _over_all(motion, *-np.log(np.ptp(motion.state, axis=0) + 1e-9))
 
 
-def highest(motion: Motion) -> Measure:
-    """Return the largest value of each channel."""
-    rows = motion.state.argmax(axis=0)
-    return _at(motion, motion.state.max(axis=0), rows, rows)
-
-
-def lowest(motion: Motion) -> Measure:
-    """Return the smallest value of each channel."""
-    rows = motion.state.argmin(axis=0)
-    return _at(motion, motion.state.min(axis=0), rows, rows)
+def extremes(motion: Motion, sign: int) -> Measure:
+    """Return the largest value of each channel, or with the sign -1 the smallest."""
+    rows = (sign * motion.state).argmax(axis=0)
+    return _at(motion, np.take_along_axis(motion.state, rows[None], axis=0)[0], rows, rows)
 
 
 def ends(motion: Motion) -> Measure:
@@ -334,12 +329,12 @@ CHECKS: tuple[Check, ...] = (
         lambda value: float(np.exp(-value)), by_task=True,
     ),
     Check(
-        "above", highest, "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
+        "above", partial(extremes, sign=1), "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
         by_task=True, relative=True,
     ),
     Check(
-        "below", lowest, "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
+        "below", partial(extremes, sign=-1), "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
         by_task=True, relative=True,
     ),

@@ -6,10 +6,11 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from fnmatch import fnmatch
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
+from shutil import copyfileobj
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -154,13 +155,6 @@ def opened(unit: Unit) -> Any:
     return system.open_input_file(_path_of(base, unit.name, unit.archive))
 
 
-@contextmanager
-def local_copies(units: Sequence[Unit]) -> Iterator[list[Path]]:
-    """Context manager: `local_copy` of each of some units, all at once."""
-    with ExitStack() as stack:
-        yield [stack.enter_context(local_copy(unit)) for unit in units]
-
-
 def _within(folder: Path, name: str) -> Path:
     """Return the path of a name in a folder; names are data, and lead nowhere else."""
     parts = PurePosixPath(name).parts
@@ -177,8 +171,7 @@ def _path_of(base: str, name: str, archive: str) -> str:
 def _copy(system: Any, path: str, target: Path, file: File) -> None:
     try:
         with system.open_input_stream(path) as source, target.open("wb") as copy:
-            while chunk := source.read(_CHUNK):
-                copy.write(chunk)
+            copyfileobj(source, copy, _CHUNK)
     except FileNotFoundError as error:
         raise DataError(f"expected {file.name} in the archive, it has vanished since it was listed") from error
     except OSError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -28,7 +29,7 @@ from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import local_copies
+from kineme.pieces.archive import local_copy
 from kineme.pieces.planning import Piece
 from kineme.pieces.run import Source, noted
 
@@ -87,7 +88,8 @@ def _recordings(
     What cannot be read is added to the problems of the source.
     """
     how = how_to_read(options["reading"])
-    with local_copies(source.piece.units) as folders:
+    with ExitStack() as copies:
+        folders = [copies.enter_context(local_copy(unit)) for unit in source.piece.units]
         entries = [
             Entry(folder / unit.name, Path(unit.name), unit.shown)
             for folder, unit in zip(folders, source.piece.units, strict=True)

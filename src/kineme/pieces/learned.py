@@ -70,24 +70,16 @@ class Heads(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """All parts together, by what their rows say of files.
+    """All parts together, by what their rows say of files."""
 
-    - `heads`: text of the columns of files -> what it says.
-    - `unlike`: the same texts -> what keeps files from being learned, or None.
-    - `most`: the columns of most movements, in which all are learned.
-    - `learned`: the channels of these; None if there are files without names of columns, of which nothing is known.
-    - `sources`: name of a data set -> its checksum and its bytes; those of files are in their rows.
-    - `rows`: number of movements; `people`: who showed them; `notes`: what a person should know of the columns.
-    """
-
-    heads: Mapping[str, Heads]
-    unlike: Mapping[str, str | None]
-    most: Heads
-    learned: Channels | None
-    sources: Mapping[str, tuple[str, int]]
-    rows: int
-    people: Sequence[str]
-    notes: tuple[str, ...]
+    heads: Mapping[str, Heads]  # text of the columns of files -> what it says
+    unlike: Mapping[str, str | None]  # the same texts -> what keeps files from being learned, or None
+    most: Heads  # the columns of most movements, in which all are learned
+    learned: Channels | None  # the channels of these; None if files have columns without names
+    sources: Mapping[str, tuple[str, int]]  # name of a data set -> checksum and bytes; those of files are in their rows
+    rows: int  # movements
+    people: Sequence[str]  # who showed them
+    notes: tuple[str, ...]  # what a person should know of the columns
 
     def is_described(self, heads: Heads) -> bool:
         """Tell whether a file is described in the columns that are learned."""

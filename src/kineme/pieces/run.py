@@ -40,20 +40,13 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class Job:
-    """Work to do on every piece.
-
-    - `task`: its name.
-    - `work`: source -> tables of Arrow, the rows of its part; a function that pickle finds by its name.
-    - `output`: folder of the parts.
-    - `specification`: all that the rows depend on besides the piece, as plain data: another one makes parts stale.
-    - `ending`: ``.parquet``, or ``.arrow`` for parts that are mapped into memory.
-    """
+    """Work to do on every piece; `specification` is all that the rows depend on besides it, as plain data."""
 
     task: str
-    work: Callable[[Source], Iterable[Any]]
-    output: str
-    specification: Mapping[str, Any] = field(default_factory=dict)
-    ending: str = ".parquet"
+    work: Callable[[Source], Iterable[Any]]  # source -> tables of Arrow, its part; pickle finds it by its name
+    output: str  # folder of the parts
+    specification: Mapping[str, Any] = field(default_factory=dict)  # another one makes parts stale
+    ending: str = ".parquet"  # or ".arrow", for parts that are mapped into memory
 
     def path(self, piece: Piece) -> Path:
         """Return the part of a piece."""

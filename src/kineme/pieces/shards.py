@@ -51,18 +51,12 @@ _SPOILED = (OSError, ValueError, LookupError, TypeError, EOFError, BadZipFile, A
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """What all shards of a folder have in common.
+    """What all shards of a folder have in common."""
 
-    - `library`: the id of the library that it was fitted to.
-    - `specification`: how the feature rows of shards are described.
-    - `bases`: of each representation that is compared sample by sample, see `similarity.bounds.fit_bases`.
-    - `comparison`: of those representations of the specification that have a weight.
-    """
-
-    library: str
-    specification: ComparisonSpecification
-    bases: tuple[Array, ...]
-    comparison: Comparison
+    library: str  # id of that which it was fitted to
+    specification: ComparisonSpecification  # of the feature rows of shards
+    bases: tuple[Array, ...]  # of what is compared sample by sample, see `similarity.bounds.fit_bases`
+    comparison: Comparison  # of those representations of the specification that have a weight
 
     @cached_property
     def digest(self) -> str:

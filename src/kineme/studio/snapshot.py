@@ -20,7 +20,7 @@ from kineme.kernels.pair_distances import Shapes
 from kineme.kernels.procrustes import Procrustes
 from kineme.library.grounding import prototype_of
 from kineme.library.library import ActionLibrary
-from kineme.library.members import Members, members_of
+from kineme.library.members import Members, members_of, some_of_each
 from kineme.library.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
@@ -33,7 +33,6 @@ from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
 from kineme.similarity.scores import Classifier
@@ -358,12 +357,7 @@ def some_members(members: Members, most: int) -> Members:
     each = int(counts.max(initial=1))
     while np.minimum(counts, each).sum() > most:
         each -= 1
-    chosen = np.concatenate(
-        [start + evenly_spaced(int(n), min(each, int(n))) for start, n in zip(members.first, counts, strict=True)]
-    )
-    first = np.concatenate(([0], np.cumsum(np.minimum(counts, each))[:-1])).astype(np.intp)
-    groups = None if members.groups is None else members.groups[chosen]
-    return Members(members.ids[chosen], members.names, first, groups)
+    return some_of_each(members, each)
 
 
 def _snapshot(classes: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:

@@ -7,9 +7,7 @@ import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import anyio.to_thread
@@ -44,12 +42,13 @@ _KINDS = {
     ".webmanifest": "application/manifest+json",
     ".txt": "text/plain; charset=utf-8",
 }
+_PACKAGE = Path(__file__).parents[2]
 #: Folders of the package whose files are served, and under which path.
-_FOLDERS = {"": ("studio", "web"), "runtime/": ("studio", "javascript")}
+_FOLDERS = {"": "studio/web", "runtime/": "studio/javascript"}
 #: Files of other rooms: what draws an arm.
 _VENDORED = {
-    "vendor/scene.min.js": ("robots", "view", "vendor", "scene.min.js"),
-    "vendor/viewer.js": ("robots", "view", "page", "viewer.js"),
+    "vendor/scene.min.js": "robots/view/vendor/scene.min.js",
+    "vendor/viewer.js": "robots/view/page/viewer.js",
 }
 
 ABOUT = """An action library: what movements are, what they are called, and how they go on.
@@ -257,26 +256,14 @@ class StaticFiles:
 
 def static_files() -> dict[str, StaticFile]:
     """Read all files, by their path; ``/`` is the page."""
-    package = files("kineme")
-    by_path: dict[str, Traversable] = {}
+    by_path = {path: _PACKAGE / where for path, where in _VENDORED.items()}
     for path, folder in _FOLDERS.items():
-        by_path |= _below(package.joinpath(*folder), path)
-    by_path |= {path: package.joinpath(*where) for path, where in _VENDORED.items()}
+        below = (file for file in (_PACKAGE / folder).rglob("*") if file.suffix in _KINDS)
+        by_path |= {path + file.relative_to(_PACKAGE / folder).as_posix(): file for file in below}
     by_path[""] = by_path["index.html"]
-    return {f"/{path}": _read(file) for path, file in by_path.items()}
-
-
-def _below(folder: Traversable, path: str) -> dict[str, Traversable]:
-    by_path: dict[str, Traversable] = {}
-    for entry in folder.iterdir():
-        if entry.is_dir():
-            by_path |= _below(entry, f"{path}{entry.name}/")
-        elif PurePath(entry.name).suffix in _KINDS:
-            by_path[path + entry.name] = entry
-    return by_path
-
-
-def _read(file: Traversable) -> StaticFile:
-    body = file.read_bytes()
-    tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
-    return StaticFile(body, _KINDS[PurePath(file.name).suffix].encode(), tag.encode())
+    answers = {}
+    for path, file in by_path.items():
+        body = file.read_bytes()
+        tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+        answers[f"/{path}"] = StaticFile(body, _KINDS[file.suffix].encode(), tag.encode())
+    return answers

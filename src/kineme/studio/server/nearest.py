@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI
 from pydantic import Field
 from starlette.responses import JSONResponse
 
@@ -112,7 +112,7 @@ def create_search_app(
     app = FastAPI(title=COMMAND, openapi_url="/openapi.json", docs_url=None, redoc_url=None)
     answer_errors(app)
     for kind, status in ((UnavailableError, 503), (DataError, 500)):
-        app.add_exception_handler(kind, _refusal(status))
+        app.add_exception_handler(kind, lambda _, error, status=status: JSONResponse({"error": str(error)}, status))
     turns = Turns(processes.candidates)
 
     @app.get("/health")
@@ -139,13 +139,6 @@ def create_search_app(
         app.add_middleware(middleware)
     app.add_middleware(Guard, token=token, hosts=hosts, command=COMMAND)
     return app
-
-
-def _refusal(status: int) -> Any:
-    async def refuse(_: Request, error: Exception) -> JSONResponse:
-        return JSONResponse({"error": str(error)}, status)
-
-    return refuse
 
 
 class SearchOptions(NamedTuple):

@@ -21,10 +21,9 @@ from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
 from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.library.correct import corrections_beside
-from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode, place_of
-from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.atomic import write_atomically
+from kineme.studio.server.importing import columns_of
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.validation import Array
 
@@ -326,12 +325,6 @@ def movement_of(read: Recordings, k: int) -> Recordings:
     return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
 
 
-def columns_of(read: Recordings) -> list[str]:
-    """Return the names of the columns, as they were recorded."""
-    demos = read.demonstrations
-    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
-
-
 def opened_at(path: Path) -> Iterator[Opened]:
     """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
     if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
@@ -348,19 +341,14 @@ def opened_at(path: Path) -> Iterator[Opened]:
             yield Opened(lost, entry.name, "", entry.path)
             number += 1
             continue
-        demos = read.demonstrations
-        names = columns_of(read)
-        values, stamps = demos.positions if demos.channels is None else demos.recorded, demos.movements.stamps
+        demos, names = read.demonstrations, {"": tuple(columns_of(read))}
         for k, source in enumerate(read.sources):
             rows = slice(demos.offsets[k], demos.offsets[k + 1])
             where = " ".join(filter(None, (entry.name, source.place)))
             label = source.label or entry.relative.parent.name or None
-            yield Opened(
-                Episode(number, stamps[rows].copy(), {"": values[rows].copy()}, {"": tuple(names)}, label, place=where),
-                entry.name,
-                source.place,
-                entry.path,
-            )
+            values = {"": demos.recorded[rows].copy()}
+            episode = Episode(number, demos.times[rows].copy(), values, names, label, place=where)
+            yield Opened(episode, entry.name, source.place, entry.path)
             number += 1
 
 

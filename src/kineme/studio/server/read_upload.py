@@ -40,7 +40,7 @@ def save(recordings: Recordings, path: Path) -> None:
     }
     arrays = {
         "header": np.frombuffer(json.dumps(header).encode(), np.uint8),
-        "recorded": demos.positions if demos.channels is None else demos.recorded,
+        "recorded": demos.recorded,
         **{name: getattr(movements, name) for name in _ARRAYS},
     }
     with path.open("wb") as file:

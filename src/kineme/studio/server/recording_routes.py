@@ -23,8 +23,8 @@ from kineme.library.learn import learn_recordings
 from kineme.recognition.answer import certainty
 from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
-from kineme.studio.server.importing import command, reader_options, unclear
-from kineme.studio.server.opened import columns_of, movement_of
+from kineme.studio.server.importing import columns_of, command, reader_options, unclear
+from kineme.studio.server.opened import movement_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.rollout_routes import as_file
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
@@ -233,8 +233,8 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     rows = slice(*read.demonstrations.offsets[(k := _number(read, body.table)) : k + 2])
     demos, names = read.demonstrations, columns_of(read)
     chosen = [name for name in _columns_of(read, body.channels or names) if name in names]
-    values = (demos.positions if demos.channels is None else demos.recorded)[rows][:, [*map(names.index, chosen)]]
-    times = demos.movements.stamps[rows] - demos.movements.stamps[rows.start]
+    values = demos.recorded[rows][:, [*map(names.index, chosen)]]
+    times = demos.times[rows] - demos.times[rows.start]
     points = next(iter(points_in(chosen, values).values()), values[:, :3])
     ends = np.array([(span.begin, span.end) for span in body.spans]).reshape(-1, 2)
     drawn = []
@@ -393,5 +393,4 @@ def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, A
     """Return its columns over seconds since the first sample, at most 2 `width` samples of each."""
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
-    values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    return records.plot(demos.movements.stamps[rows], values, columns_of(read), width)
+    return records.plot(demos.times[rows], demos.recorded[rows], columns_of(read), width)
