@@ -35,11 +35,7 @@ class Annotated(NamedTuple):
 def annotate(
     store: Store, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:
-    """Find the movements of a library's symbols in long recordings, and unknown motion between them.
-
-    Each movement of the recordings is searched on its own, at an error rate as in `Recognizer.spot`. `progress` is
-    called now and then with the seconds of recordings that are done.
-    """
+    """Find movements of symbols in long recordings, each searched on its own, and unknown motion between them."""
     return annotate_by(some_of_each_symbol(store), recordings, error_rate, progress)
 
 

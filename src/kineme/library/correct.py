@@ -90,10 +90,9 @@ def motions_in(path: Path) -> list[Annotation]:
 
 
 def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
-    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of.
+    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of, else refuse.
 
-    A stretch is as annotated if symbol and both ends are the same, to one sample. Others are compared with the
-    annotated one that shares most of the union with them. A `DataError` says that no row is of these recordings.
+    A stretch is as annotated if symbol and ends are the same, to one sample; others, by which shares most of the union.
     """
     after, problems = stretches_of(recordings, corrected)
     if not after:

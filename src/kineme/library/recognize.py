@@ -168,10 +168,7 @@ def monitor(
     noise: float | None,
     stream: Callable[[], Live],
 ) -> Monitor:
-    """Monitor by at most 500 of the movements, carried to a start and a goal if one is given.
-
-    Carried, positions are absolute, and the paths are those of the primitives, as a robot executes them.
-    """
+    """Monitor by at most 500 of the movements; by their primitives' absolute paths if a start or a goal is given."""
     if not len(ids):
         raise SpecificationError("expected a symbol with movements to monitor by, got one without any")
     ids = ids[evenly_spaced(len(ids), _MONITORED)]

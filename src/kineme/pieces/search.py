@@ -111,7 +111,10 @@ class Shards:
         """Make the indexes now, and remove those of shards that are there no more."""
         self.groups  # noqa: B018 - made on use
         groups = [self.shards[each.start : each.stop] for each in groups_of(self.shards, self.most)]
-        remove_others(self.folder, *self.plan, self.reduction, groups)
+        used = {f"{FOLDER}{_key(*self.plan, self.reduction, shards)}" for shards in groups}
+        for path in self.folder.glob(f"{FOLDER}*"):
+            if path.name not in used:
+                shutil.rmtree(path, ignore_errors=True)
 
     def nearest(self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES) -> list[list[Near]]:
         """Return the `n` nearest of all movements to each of some in the columns of the library.
@@ -333,16 +336,6 @@ def open_group(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction
         arrays = [np.load(path / f"{name}.npy", mmap_mode="r") for name in names]
         return Group(Index(*arrays[:4]), *arrays[4:])
     return group
-
-
-def remove_others(
-    folder: Path, plan: Plan, chosen: list[int], reduction: Reduction, groups: Sequence[Sequence[Shard]]
-) -> None:
-    """Remove indexes of shards that are there no more, or that are in other groups now."""
-    used = {_key(plan, chosen, reduction, shards) for shards in groups}
-    for path in folder.glob(f"{FOLDER}*"):
-        if path.name.removeprefix(FOLDER) not in used:
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def _key(plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> str:

@@ -86,10 +86,7 @@ def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC)
 
 
 def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool) -> None:
-    """Write a JointTrajectory, whose time stamp 0 controllers take as now, and a JointState for each sample.
-
-    Discrete channels are further names of the latter.
-    """
+    """Write a JointTrajectory, whose time stamp 0 controllers take as now, and a JointState of each sample."""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)

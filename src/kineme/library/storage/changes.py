@@ -128,11 +128,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
 def assign(
     store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None, description: str | None = None
 ) -> int:
-    """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
-
-    A symbol that is created has the medoid as its prototype, if that is among the movements. The description is set if
-    one is given.
-    """
+    """Assign movements to a symbol, created if needed, then with the medoid as prototype; they leave the one before."""
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
     values: dict[str, Any] = {}

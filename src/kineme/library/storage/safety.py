@@ -37,7 +37,6 @@ _STEPS = 200_000  # of SQLite's virtual machine between two checks of the limits
 #: Limit of steps for one statement: a minimum, and a number per byte of the file. Reading takes up to three steps per
 #: byte of a row, and a hundredth of that for stored features; pages that refer to each other in circles exceed it.
 _WORK, _WORK_PER_BYTE = 10_000_000, 10
-_ROOM = 1 << 24  # bytes that a copy may have beyond twice the size of the file
 _SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # limit of time, with an amount per byte that slow disks keep
 
 #: Settings that Python can change from 3.12 on, by name: features that a library does not need, and features that do
@@ -170,12 +169,6 @@ def limited(connection: Connection, path: Path) -> AbstractContextManager[None]:
     """Interrupt, within the context, also once all statements together take too long for the size of the file."""
     end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
     return connection.stopping(lambda: time.monotonic() > end)
-
-
-def limited_copy(connection: Connection, path: Path, copy: Path) -> AbstractContextManager[None]:
-    """Interrupt, within the context, also once the copy is far larger than the file."""
-    most = 2 * size_of(path) + _ROOM
-    return connection.stopping(lambda: size_of(copy) > most)
 
 
 def is_lost(path: Path | Address) -> bool:

@@ -169,10 +169,7 @@ def relaxed(robot: Robot, path: descent.TaskPath, turn_costs: Array, joints: Arr
 
 
 def choose_posture(robot: Robot, path: descent.TaskPath, turn_costs: Array, stands: Array) -> Array:
-    """The posture at the start from which the whole movement costs least, with the way to it.
-
-    0.1 is added for each radian of the joint that has farthest to go from where it `stands` (n,).
-    """
+    """The posture at the start from which the movement costs least, plus 0.1 a radian of the joint farthest from it."""
     starts = descent.reaching_postures(
         robot, path.positions[0], path.rotations[0], turn_costs, descent.pose_in_words(path, 0)
     )
@@ -182,10 +179,7 @@ def choose_posture(robot: Robot, path: descent.TaskPath, turn_costs: Array, stan
 
 
 def choose_place(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> descent.TaskPath:
-    """The path shifted, among 27 places around where the tip rests, to where the whole movement costs least.
-
-    A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
-    """
+    """The path at that of 27 places around the resting tip where it costs least; a meter below the base costs 100."""
     tip = descent.kinematics(robot, robot.rest[None])[0][0]
     center = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2
     shifts = tip - center + np.array(list(product(_OFFSETS, repeat=3))) * np.linalg.norm(tip)

@@ -202,10 +202,7 @@ class Way(NamedTuple):
     sought: bool  # by `pursue`, among many postures: that takes as long as fifty others
 
     def joints(self, path: descent.TaskPath, place: str, stands: Array) -> tuple[CubicSpline, descent.TaskPath]:
-        """Solve the joints over time, and place the path, for an arm that stands at `stands` (n,).
-
-        The posture at the start, and a place that is free, are those with which the whole movement costs least.
-        """
+        """Solve the joints over time, and place the path where it is free, at least cost from where they stand (n,)."""
         robot, costs = self.ik.robot, self.ik.costs
         if place == "free":
             path = choose_place(robot, path, costs)

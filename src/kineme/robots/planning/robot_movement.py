@@ -99,10 +99,7 @@ class PlannedPath(NamedTuple):
 
 
 def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> RobotMovement:
-    """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does.
-
-    Where the fastest timing along the path is slower than the movement itself, it is that.
-    """
+    """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does."""
     robot, joints, rate = planned.robot, planned.joints, planned.rate
     itself = partial(as_generated, robot, joints, rate)
     if timing == "generated":
