@@ -46,10 +46,7 @@ class Unit(NamedTuple):
 
 
 def is_remote(archive: str) -> bool:
-    """Tell whether an archive lies in an object store or another system that its URI names, as ``s3://bucket/fleet``.
-
-    The path of a folder, and ``file://``, are of this machine.
-    """
+    """Tell whether an archive lies in another system that its URI names, as ``s3://bucket/fleet``, not ``file://``."""
     return bool(_REMOTE.match(archive)) and not archive.startswith("file://")
 
 
@@ -76,11 +73,7 @@ def check_apart(output: str | Path, archives: Sequence[str]) -> None:
 
 
 def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[Unit], list[Problem]]:
-    """List what is to be read in archives, sorted by name, and what cannot be listed.
-
-    Only names, sizes and times are looked at, and of folders whether they are data sets. What is in two archives is
-    listed once.
-    """
+    """List what is to be read in archives, once each and sorted by name, and what cannot be listed."""
     units: list[Unit] = []
     problems: list[Problem] = []
     listed: set[Path] = set()
@@ -129,10 +122,7 @@ def _local_unit(archive: str, entry: Entry) -> Unit:
 
 @contextmanager
 def local_copy(unit: Unit) -> Iterator[Path]:
-    """Context manager: a folder that holds a unit under its name; of this machine, the folder that it lies in.
-
-    Files of a store are copied to a temporary folder, which is removed afterwards.
-    """
+    """Context manager: a folder that holds a unit under its name; of a store, a temporary one with copies."""
     archive = unit.archive
     if not is_remote(archive):
         path = path_at(archive)

@@ -83,10 +83,7 @@ def _table(columns: Mapping[str, Any], tables: Tables) -> Any:
 def _recordings(
     source: Source, options: Options
 ) -> Iterator[tuple[Recordings, Sequence[str | None] | None, str | None]]:
-    """Yield the recordings of a piece with who showed them, and of a data set the checksums of its files.
-
-    What cannot be read is added to the problems of the source.
-    """
+    """Yield the recordings of a piece with who showed them, and of a data set the checksums of its files."""
     how = how_to_read(options["reading"])
     with ExitStack() as copies:
         folders = [copies.enter_context(local_copy(unit)) for unit in source.piece.units]
@@ -107,10 +104,7 @@ def _recordings(
 
 
 def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> Iterator[Recordings | Problem]:
-    """Yield files as one set of recordings; one by one, if one that is unlike the others can be read alone.
-
-    Which of them are left out is said by the whole archive, not by a piece.
-    """
+    """Yield files as one set of recordings; one by one, if one that is unlike the others can be read alone."""
     if numbers is not None:
         yield from read_entry(entries[0], how.layout, how.rule, **how.switches, numbers=numbers)
         return

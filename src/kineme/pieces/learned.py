@@ -48,10 +48,7 @@ class Heads(NamedTuple):
         return frozenset() if columns.are_nameless else frozenset(columns.names)
 
     def unlike(self, most: Heads, by_number: bool) -> str | None:
-        """Say what keeps a file from being read with those of these columns; None if nothing does.
-
-        Columns without names, or chosen by their numbers, are taken in their order.
-        """
+        """Say what keeps a file from being read with those of these columns; None if nothing does."""
         if self.width != most.width:
             return f"{self.width} dimensions where most have {most.width}"
         if self.sensors != most.sensors and not by_number:
@@ -135,10 +132,7 @@ def _compared(
 
 
 def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[Any, str]:
-    """Return the rows of an inspection of files in the columns of most, None without any, and these columns.
-
-    Other files are added to the problems, and so are those in other units: their rows are in their own.
-    """
+    """Return the rows of an inspection of files in the columns and units of most, and these; others are problems."""
     import pyarrow as pa
     from pyarrow import compute
 
@@ -167,9 +161,8 @@ def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[
 def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]:
     """Return the columns of most, from how many movements and files have each, and notes on kinds that differ.
 
-    So many recordings are read as one set, too: by the dimensions of most movements, then by the names of most files;
-    of equally many it is what is met first. A column that moves in some of them is not discrete; other kinds are those
-    of most files.
+    By the dimensions of most movements, then the names of most files, as recordings of one set. A column that moves in
+    some files is not discrete; other kinds are those of most.
     """
 
     def frequent(of: Callable[[Heads], Any], among: Sequence[tuple[Heads, int, int]], by_files: bool = True) -> Any:
@@ -219,8 +212,7 @@ def learned(
 ) -> Iterator[tuple[list[str | None], Committed]]:
     """Store the movements of all parts, and yield the labels of each batch with what came of it.
 
-    What is described in the columns of the library is written as it is; what is not is described again, from its
-    samples in single precision. Files whose columns do not fit are added to the problems. An undo takes back all.
+    What is not in the columns of the library is described again. Files that do not fit are added to the problems.
     """
     store.check_writable()
     if store.specification.to_json() != asked.options["specification"]:

@@ -100,10 +100,7 @@ class Part(NamedTuple):
 
 
 def run_piece(job: Job, piece: Piece) -> Outcome:
-    """Do a piece, unless its part is there and fits; whatever goes wrong is a failed outcome, and stops nothing.
-
-    The part appears whole or not at all, and is the same bytes whoever makes it. A full disk alone is an error here.
-    """
+    """Do a piece, unless its part is there and fits; whatever goes wrong but a full disk is a failed outcome."""
     before = time.process_time()
     path = job.path(piece)
     about = job.about(piece)
@@ -203,10 +200,7 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
 
 
 def recordings_of(source: Source, options: Mapping[str, Any], reference: Known | None = None) -> Iterator[Recordings]:
-    """Yield the recordings of a piece as `read_recordings` reads them, file by file, or some episodes at a time.
-
-    What cannot be read is added to the problems of the source.
-    """
+    """Yield the recordings of a piece as `read_recordings` reads them, file by file, or some episodes at a time."""
     layout, rule, switches, join = how_to_read(options, reference)
     if join:
         raise DataError("expected recordings that are read one by one, got --join-files; join them first")

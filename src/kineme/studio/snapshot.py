@@ -271,12 +271,10 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
 
 
 def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
-    """Header and arrays of C primitives, one of each class, and of their specification.
+    """Header and arrays of C primitives, one of each class, and with `learns` of what fits other movements.
 
-    With `learns`, the matrices are among them that fit other movements, and the same ones in other formulations.
-    Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
-    no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`
-    differs.
+    Weights are in single precision, as libraries store them. The matrix that fits the path has no goal in it, so that
+    the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal` differs.
     """
     dmp = primitives.dmp
     header = {
@@ -299,23 +297,17 @@ def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
 
 
 def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | None:
-    """A batch of one, for `openPrimitive` of the runtime; None if not every column is a position.
-
-    Angles, orientations and discrete values are written in other columns than those that move, which the runtime does
-    not know.
-    """
+    """A batch of one, for `openPrimitive` of the runtime; None unless every column is a position, all that it knows."""
     if isinstance(primitive, PosePrimitives) or any(channel.kind != "position" for channel in primitive.channels or ()):
         return None
     return movement_parts(primitive, learns=False)
 
 
 def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: Early | None = None) -> Snapshot:
-    """The symbols of a library with their movements.
+    """The symbols of a library with `most` of their movements, equally many of each, as if it held these alone.
 
-    Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
-    many as fit into 2 MB, 451 in the plane and 300 in space, or half of that if all of them pause. Widths and
-    calibration are those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how
-    many. `early` is how movements are recognized under way; by default as `kineme.Recognizer.stream` does.
+    By default as many as fit into 2 MB, 451 in the plane and 300 in space, or half of that if all of them pause;
+    ``header["n_all"]`` says of how many. `early` is how movements are recognized under way.
     """
     store = library.store
     members = members_of(store)

@@ -127,9 +127,7 @@ def create_app(
     """The studio of one library, for any ASGI server; the library is made if there is none, unless read only.
 
     Every request must know the token, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie, and
-    ``/?once=...`` sets it one time. The hosts are names beside those of the loopback under which it may be asked; with
-    one, every address too. Read only, it refuses every change. The path `recordings` is a data set or are files whose
-    episodes it shows.
+    ``/?once=...`` sets it one time. The hosts are as of `Guard`; `recordings` are those whose episodes it shows.
     """
     studio = Studio(folder, read_only, None if recordings is None else Path(recordings))
     app = StudioApp(

@@ -37,11 +37,7 @@ _NO_NAMES = "The columns of this file have no names."
 
 
 def table_preview(path: Path) -> dict[str, Any] | None:
-    """Return the first rows of a table of text and guesses at its columns; None of other files, or without samples.
-
-    The guesses are ``time``, the head of a column or None, ``units`` of the time, ``rate`` in samples a second where
-    there is no time, ``columns`` of coordinates, and ``measured_in``, the unit that the file says of these.
-    """
+    """Return the first rows of a table of text and guesses at how it is read; None of others, or without samples."""
     form = FORMATS.get(path.suffix.lower())
     if form is None or not form.has_lines:
         return None

@@ -280,10 +280,7 @@ class OpenedRecordings:
         return {"start": 0.0 if video is None else video.start, "codec": self._info.cameras.get(camera)}
 
     def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
-        """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.
-
-        A path that leads out of the data set is none, and so is a link to anything else than a video.
-        """
+        """Return the file of a camera's video in the data set and its kind by its first bytes, or a MissingError."""
         name = opened.episode.videos.get(camera)
         if name is None or Path(name).is_absolute() or ".." in Path(name).parts:
             cameras = list(opened.episode.videos)
@@ -300,10 +297,7 @@ class OpenedRecordings:
         raise MissingError(f"expected a video (MP4, WebM) in {path.name}, got something else")
 
     def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
-        """Read one episode as a recording, in these columns or in all that are found.
-
-        Where these are no movement together, it is read in those of the feature that is read by default.
-        """
+        """Read one episode as a recording, in these columns or in all, or, if these are none, those read by default."""
         opened = self.episode(key)
         if opened.file is None:
             try:

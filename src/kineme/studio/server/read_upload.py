@@ -66,10 +66,7 @@ def load(path: Path) -> Recordings:
 
 
 def _limit(beyond: int, seconds: int) -> None:
-    """Allow so many bytes beyond what the process has, and so much work: nobody ends it once the studio was killed.
-
-    Where the system knows no such limits, there are none.
-    """
+    """Allow so many bytes and seconds more, where the system can: nobody ends it once the studio was killed."""
     status = Path("/proc/self/status")
     if not status.exists():
         return

@@ -284,10 +284,7 @@ def listening_at(host: Address) -> socket.socket:
 
 
 def certificate_of(host: Address) -> tuple[ssl.SSLContext, str]:
-    """Make a certificate for an address, signed by itself, and return it for a server, with its fingerprint (SHA-256).
-
-    The key is made anew each time, and lies in a folder that only this user can read, until the server has it.
-    """
+    """Make a certificate for an address, signed by itself, with a new key; return it for a server, and its SHA-256."""
     with needs("cryptography", "encrypt what a phone sends", "studio"):
         from cryptography import x509
         from cryptography.hazmat.primitives import hashes, serialization
@@ -310,7 +307,7 @@ def certificate_of(host: Address) -> tuple[ssl.SSLContext, str]:
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     encoding, form = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
     private = key.private_bytes(encoding, form, serialization.NoEncryption())
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:  # that only this user can read
         path = Path(folder, "wand.pem")
         path.write_bytes(private + certificate.public_bytes(encoding))
         context.load_cert_chain(path)
