@@ -333,10 +333,7 @@ def _by_neighbors(
 
 
 def by_shape(described: Described) -> Described:
-    """Without the forcing term, if movements are also compared pair by pair: across people it tells little.
-
-    What is compared in detail counts as the coarse ones, which are rotated: with more, clusters are those of people.
-    """
+    """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
     if described.pairs is None:
         return described
     n, own, coarse = len(described.blocks), described.own_weights, described.coarse()

@@ -1,9 +1,7 @@
 """Checks of an episode of robot data: one table of what each measures, what that means, and what to do about it.
 
-A check is a pure function of a `Motion`. It returns some values, of the whole episode, of each channel, or of its
-beginning and its end, each with the stretch of time that it is about. Values of checks whose `side` is "exact" count
-contradictions; all others say nothing before they are compared with those of other episodes, see
-`kineme.audit.calibrate`.
+A check is a pure function of a `Motion`: values, each with the stretch of time that it is about. Those whose `side` is
+"exact" count contradictions; all others are compared with those of other episodes, see `kineme.audit.calibrate`.
 """
 
 from __future__ import annotations

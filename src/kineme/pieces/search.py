@@ -1,12 +1,10 @@
 """The nearest movements among all of an archive, whose features lie in shards: two stages, the first one exact.
 
-First the movements with the largest bounds of the similarity, see `kineme.pieces.scan`, by the representations that are
-compared sample by sample: the same as of a search of all, whatever shards they lie in and how many there are; of equal
-ones the first by path, place and start. These are then compared by all representations.
+First the movements with the largest bounds of the similarity, see `kineme.pieces.scan`, whatever shards they lie in; of
+equal ones the first by path, place and start. These are then compared by all representations.
 
-Indexes hold the rows of some shards together, in the order in which they are searched, in files beside them. An index
-is made when shards are opened for the first time, and again when they are others: its name says which they are. Where
-nothing can be written beside the shards, it is held in memory. Its arrays are mapped: processes share them.
+Indexes hold the rows of some shards, in the order in which they are searched, in files beside them, or in memory where
+nothing can be written. Their names say of which shards they are; processes share their arrays.
 """
 
 from __future__ import annotations

@@ -230,10 +230,7 @@ def knows_masses(robot: Robot) -> bool:
 
 
 class Torques:
-    """Torques of one arm, posture by posture: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio.
-
-    Without friction, and without a load that the model does not have.
-    """
+    """Torques of one arm without friction: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio."""
 
     def __init__(self, robot: Robot) -> None:
         import pinocchio

@@ -291,10 +291,9 @@ def checks_as_data(preflight: Preflight) -> list[dict[str, Any]]:
 def tracking(
     robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, dense: tuple[Array, Along]
 ) -> Iterator[Check]:
-    """Check how far the tip is from its path, and how far turned from it.
+    """Check how far the tip is from its path, and how far turned, without limit where that is followed in part alone.
 
-    Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
-    not followed at all, the angle has no limit. Where the times of `dense` end with the path's, it is computed already.
+    Where the times of `dense` end with the path's, it is computed already.
     """
     times, state = dense
     n = len(path.times)

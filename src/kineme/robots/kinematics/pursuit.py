@@ -52,10 +52,9 @@ _NEARLY = 1e-4  # the same, if there is none: arms of few joints turn as far as 
 def pursue(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> tuple[Array, descent.TaskPath] | None:
     """Find joint positions (T, n) along a path, and return them with the path at T poses; None if there is no way.
 
-    Postures at the beginning, the end and the middle of the path are followed to both ends, all at once, by Newton's
-    method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
-    is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
-    that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
+    Postures at the beginning are followed to the end, all at once, by Newton's method with limits. What a pose leaves
+    free stays, or goes slowly towards the rest posture and away from stops. Of the ways within 0.01 mm of the path it
+    is that of least cost, smoothed as `relaxed`; if it comes to a stop, also from the end and the middle on.
     """
     path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
     margin = (1 - _INSIDE) * (robot.upper - robot.lower) / 2

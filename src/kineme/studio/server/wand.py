@@ -1,9 +1,8 @@
 """A phone as a wand: a second server on the local network, with one page and what that page sends.
 
-It listens only after a person has asked for it, at one address of a local network, encrypted, under a token of its own,
-and ends when the person ends it or when nothing has moved for a while. Nothing of the studio can be asked there, and
-nothing of the library is told but the name of what was drawn. The page sends requests instead of using a websocket:
-browsers of iPhones accept a self-signed certificate for requests alone (WebKit bug 145819).
+It listens once a person has asked for it, at one local address, encrypted, under a token of its own, until that person
+ends it or nothing moves for a while; all it tells is the name of what was drawn. The page sends requests, as browsers
+of iPhones accept a self-signed certificate for these alone (WebKit bug 145819).
 """
 
 from __future__ import annotations
