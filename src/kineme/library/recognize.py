@@ -70,10 +70,6 @@ class LibraryRecognizer:
             comparison, references, shared.hypotheses, Decision(confidence, patience), partial(self._answer, now)
         )
 
-    def model(self) -> KnownClasses | TwoStageSearch:
-        """Return the recognition of the symbols as they are now: by all of their movements, or in two stages."""
-        return self.current().model
-
     def current(self) -> Current:
         """Return the model of the symbols as they are now; one thread makes it, others wait."""
         with self._turn:
@@ -141,7 +137,7 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
     stored = StoredReferences(
         tuple(reduced.bases[r] for r in columns),
         tuple(tuple(block[r] for r in columns) for block in reduced.blocks),
-        reduced.rows(members.ids),
+        np.searchsorted(reduced.ids, members.ids),
         members.first,
         how,
         lambda rows: read.feature_blocks(store, reduced.ids[rows], how.stored_rows),

@@ -167,6 +167,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.studio.close()
 
 
+class _RefusedError(Exception):
+    """Ends the work on a request, unless that catches everything."""
+
+
 class LimitedBodies:
     """Refuse requests that are too large or stop arriving: 413 and 408, whatever their head says."""
 
@@ -178,50 +182,41 @@ class LimitedBodies:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        body = _Body(receive, FILE_BYTES if scope["path"] == FILES else JSON_BYTES, self.silence)
+        most = FILE_BYTES if scope["path"] == FILES else JSON_BYTES
+        received, complete = 0, False
+        refused: tuple[int, str] | None = None
+
+        def check(size: int) -> None:
+            nonlocal refused
+            if size > most:
+                refused = 413, f"expected at most {most // 2**20} MB, got more; send less at once"
+                raise _RefusedError
+
+        async def limited() -> Message:
+            nonlocal received, complete, refused
+            if complete:  # what comes after the body is that the client has gone, whenever it does
+                return await receive()
+            try:
+                async with asyncio.timeout(self.silence):
+                    message = await receive()
+            except TimeoutError:
+                refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
+                raise _RefusedError from None
+            received += len(message.get("body", b""))
+            complete = not message.get("more_body", False)
+            check(received)
+            return message
 
         async def unless_refused(message: Message) -> None:
-            if body.refused is None:
+            if refused is None:
                 await send(message)
 
         announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if not body.is_too_large(int(announced[:20]) if announced.isdigit() else 0):
-            with suppress(_RefusedError):
-                await self.app(scope, body, unless_refused)
-        if body.refused is not None:
-            await refuse(scope, send, *body.refused)
-
-
-class _RefusedError(Exception):
-    """Ends the work on a request, unless that catches everything."""
-
-
-class _Body:
-    def __init__(self, receive: Receive, most: int, silence: float) -> None:
-        self.receive, self.most, self.silence = receive, most, silence
-        self.got, self.complete = 0, False
-        self.refused: tuple[int, str] | None = None
-
-    async def __call__(self) -> Message:
-        if self.complete:  # what comes after the body is that the client has gone, whenever it does
-            return await self.receive()
-        try:
-            async with asyncio.timeout(self.silence):
-                message = await self.receive()
-        except TimeoutError:
-            self.refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
-            raise _RefusedError from None
-        self.got += len(message.get("body", b""))
-        self.complete = not message.get("more_body", False)
-        if self.is_too_large(self.got):
-            raise _RefusedError
-        return message
-
-    def is_too_large(self, size: int) -> bool:
-        """Refuse a body of more bytes than it may have."""
-        if size > self.most:
-            self.refused = 413, f"expected at most {self.most // 2**20} MB, got more; send less at once"
-        return size > self.most
+        with suppress(_RefusedError):
+            check(int(announced[:20]) if announced.isdigit() else 0)
+            await self.app(scope, limited, unless_refused)
+        if refused is not None:
+            await refuse(scope, send, *refused)
 
 
 class StaticFile(NamedTuple):

@@ -28,7 +28,6 @@ from kineme.studio.server.opened import movement_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.rollout_routes import as_file
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
-from kineme.studio.server.uploads import go_on
 
 
 class ChannelChoice(records.Change):
@@ -331,14 +330,14 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
-def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = bool) -> Recordings:
     """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
     if studio.opened is not None and key in studio.opened:
         return studio.opened.recordings(key, columns)
     return studio.uploads.recordings(key, columns, check)
 
 
-def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = bool) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = _read(studio, key, check=check)
     ours = [column for channel in studio.library.channels or () for column in channel.columns]
@@ -348,7 +347,7 @@ def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[
     return read
 
 
-def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = bool) -> Recordings:
     """Read one table of a file, in the same columns."""
     read = _in_columns(studio, key, body, check)
     return movement_of(read, _number(read, body.table))

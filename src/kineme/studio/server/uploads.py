@@ -38,10 +38,6 @@ _MOST_FILES = 8  # files
 _LONGEST = 200  # bytes of a name
 
 
-def go_on() -> None:
-    """Do nothing: the client still waits."""
-
-
 class Uploads:
     """The last few files that were sent; forgotten when the studio ends."""
 
@@ -84,7 +80,7 @@ class Uploads:
                 self._read = {which: read for which, read in self._read.items() if which[0] != old}
         return key
 
-    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = bool) -> Recordings:
         """Read a file that was sent, in these columns or those found; `check` raises where nobody waits any more."""
         path, chosen, options = self.path(key), tuple(columns), self.options.get(key, {})
         read = self._read.get((key, chosen))
@@ -108,7 +104,7 @@ class Uploads:
             )
         return path
 
-    def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = go_on) -> Recordings:
+    def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = bool) -> Recordings:
         """Read a file with options of the reader from now on; where they are refused, it is read as before."""
         read = self._read_apart(self.path(key), options, check)
         with self._turn:
