@@ -196,7 +196,7 @@ def _part_rotation(R: Array, s: Array) -> Array:
 
     d = len(R)
     if d not in (2, 3):
-        return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()
+        return np.tile(np.eye(d), (len(s), 1, 1))
     in_space = np.eye(3)
     in_space[:d, :d] = R
     return np.asarray(

@@ -217,10 +217,7 @@ def _one_each(what: str, given: Any, n: int) -> list[Any]:
 def _as_origins(
     source: Source | Sequence[Source | None] | None, places: Sequence[Any] | None, n: int
 ) -> tuple[list[Source | None], list[str | None]]:
-    """Return the source of each movement and its position there, at which no other movement may be.
-
-    Without positions, duplicates are found by their samples alone.
-    """
+    """Return the source of each movement and its position there, at which no other movement may be."""
     sources: list[Source | None] = (
         [source] * n if source is None or isinstance(source, Source) else _one_each("source, or one", source, n)
     )

@@ -222,10 +222,7 @@ def _version() -> str:
 
 @contextmanager
 def cluster_client(address: str, timeout: float = 10.0) -> Iterator[Any]:
-    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``.
-
-    It waits so long for the scheduler to answer [s].
-    """
+    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``."""
     with needs("distributed", "use a cluster of Dask", "cluster"):
         from distributed import Client
     try:

@@ -238,7 +238,7 @@ def learned(
                         unlike.add(path)
                 continue
             batch = _batch(store, rows, of.heads[text], of, is_ours)
-            origins = list(zip(*(_texts(rows, name) for name in _ORIGIN), strict=True))
+            origins = list(zip(*(_texts(rows, name) for name in ("path", "sha256", "size")), strict=True))
             sources = {origin: source_of(*origin) for origin in dict.fromkeys(origins)}
             batch.sources = [sources[origin] for origin in origins]
             labels.append(batch.labels)
@@ -246,9 +246,6 @@ def learned(
 
     for committed in commit_batches(store, described()):
         yield labels.pop(0), committed
-
-
-_ORIGIN = ("path", "sha256", "size")
 
 
 def _texts(rows: Any, name: str) -> list[Any]:
@@ -267,14 +264,11 @@ def _batch(store: Store, rows: Any, heads: Heads, of: Survey, is_ours: bool) -> 
     if not is_ours:
         demos = in_columns_of(store, demos)
     check_channels(store, demos)
-    labels, people = (as_names(demos, what, _texts(rows, name)) for what, name in _SAID)
+    labels, people = as_names(demos, "label", _texts(rows, "label")), as_names(demos, "group", _texts(rows, "person"))
     if is_same and is_ours:
         return Batch(demos, _texts(rows, "digest"), labels, people, [], _texts(rows, "place"), rows_by_table(rows))
     check(demos)
     return Batch(demos, digests(demos, evenly_sampled(demos)), labels, people, [], _texts(rows, "place"))
-
-
-_SAID = (("label", "label"), ("group", "person"))
 
 
 def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Any]:
