@@ -132,7 +132,7 @@ def _compared(
 
 
 def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[Any, str]:
-    """Return the rows of an inspection of files in the columns and units of most, and these; others are problems."""
+    """Return the rows of an inspection of files in the columns of most, and these; others are added to the problems."""
     import pyarrow as pa
     from pyarrow import compute
 

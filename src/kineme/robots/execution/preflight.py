@@ -281,11 +281,10 @@ def preflight_table(preflight: Preflight) -> Table:
 
 def checks_as_data(preflight: Preflight) -> list[dict[str, Any]]:
     """List the checks as plain data; None where a number is not finite."""
-
-    def finite(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return [{name: finite(value) for name, value in check._asdict().items()} for check in preflight.checks]
+    rows = [check._asdict() for check in preflight.checks]
+    return [
+        {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in row.items()} for row in rows
+    ]
 
 
 def tracking(

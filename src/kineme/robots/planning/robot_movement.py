@@ -110,7 +110,7 @@ def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> Robot
     result = _slowed(planned, partial(sampled, robot, parameterization, rate), most, follows=True)
     if result.factor <= 1 or not np.isfinite(result.preflight.slower):
         return result
-    other = _slowed(planned, itself, most)
+    other = _slowed(planned, itself, most)  # the fastest timing along the path is slower than that
     return min((result, other), key=lambda each: (not each.preflight.passed, each.trajectory.duration))
 
 

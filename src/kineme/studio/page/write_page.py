@@ -96,7 +96,7 @@ def summary_of(snapshot: Snapshot) -> str:
 
 
 def bundled(entry: Path) -> str:
-    """The module and those it imports, each in a function of its own; of `_IMPORT` and `_EXPORT` alone."""
+    """The module and those it imports, each in a function; they import and export as `_IMPORT` and `_EXPORT` say."""
     done: dict[Path, str] = {}
     parts = ['"use strict";']
     _add(entry.resolve(), done, parts)
