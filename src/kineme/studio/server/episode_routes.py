@@ -160,12 +160,9 @@ async def strip(studio: Reads, opened: Recorded, key: EpisodeKey, width: Width =
 async def put_spans(studio: Reads, opened: Recorded, key: EpisodeKey, body: SpansRequest) -> dict[str, Any]:
     """Until the studio ends, or they are saved: what a person corrected is in the table of corrections."""
     item = await studio.reading(opened.episode, key)
-    annotations = [
-        item.annotation((span.begin, span.end), span.label, span.p, span.confidence)
-        for span in sorted(body.spans, key=lambda span: span.begin)
-        if span.end > span.begin
-    ]
-    unknown = item.annotation((0.0, item.duration), None, None, None)
+    spans = sorted((span for span in body.spans if span.end > span.begin), key=lambda span: span.begin)
+    entire = FoundSpan(begin=0.0, end=item.duration)
+    *annotations, unknown = (span.annotation(*item.movement, item.origin) for span in (*spans, entire))
     opened.corrections.put(item.movement, Lane(tuple(annotations), body.corrected, (unknown,)))
     return _episode(opened, item, int(key.removeprefix(KEY)))
 

@@ -158,14 +158,6 @@ class Opened(NamedTuple):
         """Names of the columns of each feature; the one that is read by default comes first."""
         return heads_of(self.episode)
 
-    def annotation(
-        self, span: tuple[float, float], symbol: str | None, p_value: float | None, confidence: float | None
-    ) -> Annotation:
-        """Return what a stretch shows, in seconds since the first sample; without a p-value, a person said it."""
-        start, end = (self.origin + time for time in span)
-        certainty = float("nan") if p_value is None else p_value, 1.0 if confidence is None else confidence
-        return Annotation(self.recording, self.place, start, end, symbol, *certainty, self.origin)
-
     @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""

@@ -125,6 +125,11 @@ class FoundSpan(Span):
     confidence: records.Number | None = None
     certainty: records.Text | None = None
 
+    def annotation(self, recording: str, place: str, origin: float) -> Annotation:
+        """Return it by the clock of a recording that begins at `origin` [s]; without a p-value, a person said it."""
+        certainty = math.nan if self.p is None else self.p, 1.0 if self.confidence is None else self.confidence
+        return Annotation(recording, place, origin + self.begin, origin + self.end, self.label, *certainty, origin)
+
 
 class AnnotationsRequest(ChannelChoice):
     """Annotations of one table, and the format in which they are written."""
@@ -258,13 +263,8 @@ def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -
         raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
     recording = _one(studio, key, body)
     source, origin = recording.sources[0], float(recording.demonstrations.movements.stamps[0])
-    notes = [
-        Annotation(
-            *(source.path, source.place, origin + span.begin, origin + span.end, span.label),
-            *(math.nan if span.p is None else span.p, 1.0 if span.confidence is None else span.confidence, origin),
-        )
-        for span in sorted(body.spans, key=lambda span: span.begin)
-    ]
+    spans = sorted(body.spans, key=lambda span: span.begin)
+    notes = [span.annotation(source.path, source.place, origin) for span in spans]
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"labels{(ending := _ENDINGS[body.format])}"
         if body.format == "rerun":
