@@ -186,8 +186,7 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     shifts = center + s[:, None] * (matrix @ center + back.shifts[0] - center) - matrices @ center
     theta = matrices @ theta
     theta[:, :, -3:-1] += shifts[:, :, None]
-    durations = a.durations * (b.durations / a.durations) ** s
-    return from_numbers(a.dmp, theta, durations)
+    return from_numbers(a.dmp, theta, a.durations * (b.durations / a.durations) ** s)
 
 
 def _part_rotation(R: Array, s: Array) -> Array:

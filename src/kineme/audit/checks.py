@@ -113,8 +113,7 @@ def repeats(motion: Motion) -> Measure:
     ends = ends[np.minimum(speed[ends[:, 0] - 1], speed[np.minimum(ends[:, 1], len(speed) - 1)]) > moving]
     if not len(ends):
         return _over_all(motion, 0.0)
-    count = np.log1p((ends[:, 1] - ends[:, 0]).sum())
-    return _at(motion, np.array([count]), ends[:1, 0], ends[-1:, 1])
+    return _at(motion, np.log1p([(ends[:, 1] - ends[:, 0]).sum()]), ends[:1, 0], ends[-1:, 1])
 
 
 def spikes(motion: Motion) -> Measure:

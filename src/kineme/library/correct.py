@@ -154,8 +154,7 @@ def learn_corrections(
     examples = corrections.examples
     if not examples:
         return None
-    pieces = cut_stretches(recordings, examples)
-    report = learn_recordings(store, pieces, options, root=root)
+    report = learn_recordings(store, cut_stretches(recordings, examples), options, root=root)
     labels, names = [str(stretch.row.label) for stretch in examples], names_of(store, report.ids)
     for symbol in dict.fromkeys(label for label, name in zip(labels, names, strict=True) if label != name):
         others = [label == symbol != name for label, name in zip(labels, names, strict=True)]

@@ -98,8 +98,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
                 change, target, parents=json.dumps([*parsed_column("symbol_state", target, "parents", list), *parents])
             )
         for state in merged:
-            members = _leave(change, "symbol = :key", {"key": state[1]})
-            _move_members(change, members, key)
+            _move_members(change, _leave(change, "symbol = :key", {"key": state[1]}), key)
             change.retire("symbol_state", [state])
     return change.version
 
