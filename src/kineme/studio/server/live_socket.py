@@ -156,10 +156,7 @@ class _Client:
                 source.update(content, state)
             return {"state": state}
         if kind == "finish":
-            try:
-                ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
-            except KinemeError as error:
-                ended = {"error": str(error)}
+            ended = await run(self.studio.live, self.session.finish)
             if source is not None:
                 source.end(ended)
             return ended
@@ -249,22 +246,24 @@ class LiveSession:
         if self._stream is not None:
             self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
 
-    def finish(self) -> dict[str, Any] | None:
-        """Return the answer to the whole movement; None if nothing recognizes it."""
-        if self._is_old and self._begun:
-            self._renew()
-        stream, begun = self._stream, self._begun
-        self._begun = False
-        if stream is None or not begun:
-            return None
+    def finish(self) -> dict[str, Any]:
+        """Return the "answer" to the whole movement, None if nothing recognizes it; or an "error", of one too short."""
+        begun, self._begun = self._begun, False
         try:
+            if begun and self._is_old:
+                self._renew()
+            if self._stream is None or not begun:
+                return {"answer": None}
             if self._version == self.studio.library.version:
-                return stream.finish().to_dict()
-            return self.studio.library.recognize(stream.movement()).to_dict()  # changed since the movement began
+                return {"answer": self._stream.finish().to_dict()}
+            return {"answer": self.studio.library.recognize(self._stream.movement()).to_dict()}  # changed meanwhile
         except SpecificationError:  # no symbols any more
-            return None
+            return {"answer": None}
+        except KinemeError as error:
+            return {"error": str(error)}
         finally:
-            stream.reset()
+            if begun and self._stream is not None:
+                self._stream.reset()
 
     def _renew(self) -> None:
         """Follow the movement by the library as it is now; wait for that if need be."""

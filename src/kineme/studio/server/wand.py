@@ -228,10 +228,7 @@ class Phone:
                 said = await run(self._live, self._session.update, samples)
                 self.source.update(samples, said)
             if content.get("finish") is True:
-                try:
-                    ended: dict[str, Any] = {"answer": await run(self._live, self._session.finish)}
-                except KinemeError as error:  # too little of a movement
-                    ended = {"error": str(error)}
+                ended = await run(self._live, self._session.finish)
                 self.source.end(ended)
                 said = ended.get("answer") or {}
             return {name: said.get(name) for name in ("label", "certainty")}
