@@ -18,8 +18,9 @@ from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
 from kineme.io.writing.annotations import WRITERS, Annotation, write_annotations
 from kineme.io.writing.rerun import points_in, recording_scenes, write_rerun
-from kineme.library.annotate import annotate
+from kineme.library.annotate import annotate_by
 from kineme.library.learn import learn_recordings
+from kineme.library.recognize import some_of_each_symbol
 from kineme.recognition.answer import certainty
 from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
@@ -286,7 +287,8 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         work.check()  # it may have waited for others
         recording = _one(studio, key, body, work.check)
         duration = float(recording.demonstrations.durations[0])
-        report = annotate(studio.library.store, recording, body.error_rate, lambda done: work.tell(done / duration))
+        classes = some_of_each_symbol(studio.library.store)
+        report = annotate_by(classes, recording, body.error_rate, lambda done: work.tell(done / duration))
         if report.problems:
             raise SpecificationError(report.problems[0].what)
         spans = [
