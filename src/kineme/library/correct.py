@@ -90,7 +90,7 @@ def motions_in(path: Path) -> list[Annotation]:
 
 
 def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
-    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of, else refuse.
+    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of.
 
     A stretch is as annotated if symbol and ends are the same, to one sample; others, by which shares most of the union.
     """

@@ -125,7 +125,7 @@ def _members(connection: sql.Database, keys: list[int], moment: Moment) -> dict[
 
 
 def check_name(name: Any) -> str:
-    """Check a name: any Unicode text but with U+0000, which NumPy, C and shells treat as the end of a text."""
+    """Check a name: any Unicode text without U+0000, which NumPy, C and shells treat as the end of a text."""
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
     sql.check_text("a name", name, MAX_TEXT)
