@@ -103,7 +103,7 @@ def _serve(folder: Path, questions: Path) -> dict[str, Any]:
 
 def _exhaustive(library: Any, asked: Array) -> list[str]:
     """The symbol of the most similar of all movements, by the same averaged kernel."""
-    comparison = LibraryRecognizer(library.store, exhaustive=0).model().comparison
+    comparison = LibraryRecognizer(library.store, exhaustive=0).current().model.comparison
     described = describe(asked, comparison)
     ids = library.ids()
     ends = np.cumsum(library.specification.widths(library.n_dims))[:-1]

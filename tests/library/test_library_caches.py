@@ -200,7 +200,7 @@ def of_all(tmp_path, monkeypatch):
 
 def _all_answers(library):
     recognizer = LibraryRecognizer(library.store)
-    calibration = recognizer.model().calibration
+    calibration = recognizer.current().model.calibration
     answers = recognizer.recognize(library.movements())
     return [(a.label, a.ranked, a.confidence, a.p_known, a.rule, dict(a.p_values)) for a in answers], calibration
 

@@ -266,7 +266,7 @@ def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_pat
     with ActionLibrary(tmp_path / "actions") as library:
         assert library.channels == demos.channels
         assert [answer.ranked[0] for answer in library.recognize(list(angles))] == list("abab")
-        learned = LibraryRecognizer(library.store).model().comparison.checked(list(angles))
+        learned = LibraryRecognizer(library.store).current().model.comparison.checked(list(angles))
         np.testing.assert_allclose(learned.positions, demos.positions, atol=1e-9)
 
 

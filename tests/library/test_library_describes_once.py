@@ -48,7 +48,7 @@ def test_a_movement_is_described_when_it_is_learned_and_when_it_is_asked_about(t
         assert described() == 0
         library.recognize(arrays[:5])
         assert described() == 5
-        LibraryRecognizer(library.store, exhaustive=0).model()
+        LibraryRecognizer(library.store, exhaustive=0).current()
         n_sampled = described()
         LibraryRecognizer(library.store, exhaustive=0).recognize(arrays[:5])
         assert described() == n_sampled + 5

@@ -70,9 +70,9 @@ def test_a_large_library_calibrates_people_as_the_recognizer_does(tmp_path, copi
     """Of classes of one size; of other classes it knows nothing, so the novelties are the scores of members."""
     paths, labels, groups = _shown(people=[*PEOPLE, "dora"][: 2 if copies == 6 else 4], copies=copies)
     with _library(tmp_path / "actions", paths, labels, groups) as library:
-        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        ours = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
         plain = _library(tmp_path / "plain", paths, labels, None)
-        other = LibraryRecognizer(plain.store, exhaustive=0).model().calibration
+        other = LibraryRecognizer(plain.store, exhaustive=0).current().model.calibration
         plain.close()
     theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
     np.testing.assert_allclose(ours.scales, theirs.scales, rtol=1e-3)
@@ -90,7 +90,7 @@ def test_large_classes_compare_no_one_with_oneself(tmp_path, alike):
     stays = many < 18 if alike else (groups == "p0") | (many < 3)
     paths, labels, groups = paths[stays], labels[stays], groups[stays]
     with _library(tmp_path / "actions", paths, labels, groups) as library:
-        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        ours = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
     theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
     np.testing.assert_allclose(ours.scales, theirs.scales, rtol=0.1)
     np.testing.assert_allclose(*(np.quantile(calibration.own[0], 0.5) for calibration in (ours, theirs)), rtol=0.1)
@@ -100,7 +100,7 @@ def test_classes_of_one_person_each_are_told_apart_by_how_far_they_are(tmp_path)
     paths, labels, _ = _shown(people=["anna"])
     groups = labels  # each kind by a person of its own: no two movements of a kind may be compared
     with _library(tmp_path / "actions", paths, labels, groups) as library:
-        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        ours = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
     theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
     np.testing.assert_allclose(ours.scales, theirs.scales, rtol=1e-3)
 
@@ -108,11 +108,11 @@ def test_classes_of_one_person_each_are_told_apart_by_how_far_they_are(tmp_path)
 def test_a_calibration_of_other_people_is_not_taken_from_the_cache(tmp_path):
     paths, labels, groups = _shown(copies=3)
     with _library(tmp_path / "actions", paths, labels, None) as library:
-        before = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        before = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
         report = library.learn(paths, groups=groups)  # said later: nothing is added but who showed what
         assert (report.added, report.duplicates) == (0, len(paths))
-        after = LibraryRecognizer(library.store, exhaustive=0).model().calibration
-        again = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        after = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
+        again = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
     assert (after.scales > 1.4 * before.scales).all()
     np.testing.assert_array_equal(after.scales, again.scales)
 

@@ -126,7 +126,7 @@ def test_large_classes_keep_the_error_rate(make):
 def test_calibration_finds_the_nearest_of_a_large_class(make, d):
     """Or one hardly farther: bounds leave out what is compared pair by pair, so the few with the best are compared."""
     library = make(_kinds([400, 5], d, seed=7, spread=0.1))
-    model = LibraryRecognizer(library.store, exhaustive=0).model()
+    model = LibraryRecognizer(library.store, exhaustive=0).current().model
     stored, similarity = model.stored, model.comparison.similarity
     members, questions = stored.members, sampled_calibration._positions(stored, 0)[::4]
     alone = np.arange(len(members))
@@ -151,12 +151,12 @@ def test_calibration_holds_few_bounds_at_once(make, monkeypatch):
         return bounds(self, similarity, questions)
 
     monkeypatch.setattr(StoredReferences, "bounds", noted)
-    few = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    few = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
     assert sum(together) == 100
     assert max(together) <= 8
     monkeypatch.setattr(sampled_calibration, "_BOUNDED", 100)
     (library.folder / "calibration.cache").unlink()
-    many = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    many = LibraryRecognizer(library.store, exhaustive=0).current().model.calibration
     assert together[-1] == 100
     np.testing.assert_allclose(few.scales, many.scales, rtol=1e-6)
 

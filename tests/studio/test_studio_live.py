@@ -16,7 +16,7 @@ from studio_samples import LIVE, make_library, request_of, samples
 from kineme import ActionLibrary, Recognizer
 from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.studio.page.write_page import library_page
-from kineme.studio.server.live_socket import MOST, Follower, Sources, _Client, _Received, parsed_samples
+from kineme.studio.server.live_socket import MOST, Follower, Sources, _Client, parsed_samples
 from kineme.studio.server.studio import Changes, Studio
 from kineme.studio.snapshot import DRAWN
 from movement_samples import draw_shapes, turn
@@ -427,7 +427,7 @@ def test_a_page_that_does_not_read_delays_no_program_and_is_told_all_of_it_in_th
 
         sources = Sources()
         page = _Client(SimpleNamespace(send_text=send_text), None, sources)
-        await page._answer(_Received(command="watch"))
+        await page._answer("watch", None)
         source = sources.add()
         for k in range(500):
             source.update(np.array([[k, 1.0, 2.0]]), {"k": k})  # returns at once

@@ -332,18 +332,18 @@ def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, m
     path = f"/api/recordings/{key}/spotted"
     assert client.get(path).json() == {"share": None}
     seen, begun = [], Event()
-    real = recording_routes.annotate
+    real = recording_routes.annotate_by
 
-    def slow(store, recording, error_rate, progress):
+    def slow(classes, recording, error_rate, progress):
         if begun.is_set():
-            return real(store, recording, error_rate, progress)
+            return real(classes, recording, error_rate, progress)
         begun.set()
         for k in range(1000):
             progress(0.001 * k * recording.demonstrations.durations[0])
             seen.append(client.get(path).json()["share"])
         raise AssertionError
 
-    monkeypatch.setattr(recording_routes, "annotate", slow)
+    monkeypatch.setattr(recording_routes, "annotate_by", slow)
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(client.post, path, json={})
         begun.wait(300)

@@ -134,11 +134,10 @@ def _clustered(
 
 
 def agreement(comparison: Comparison, references: References) -> float:
-    """Mean similarity from which on movements are one symbol, measured on known symbols.
+    """Mean similarity from which on movements are one symbol: half way from that within one to that with the nearest.
 
-    Half way from the typical mean similarity within a symbol to that with the nearest other symbol. Where each symbol
-    was shown once, the similarity at 0.6 of the typical distance to the nearest other symbol, as
-    `kineme.recognition.conformal.Calibration` takes it.
+    Where each symbol was shown once, the similarity at 0.6 of the typical distance to the nearest other one, as of
+    `kineme.recognition.conformal.Calibration`.
     """
     some = evenly_spaced(len(references), 500)
     described, labels = references.described.take(some), references.labels[some]
@@ -279,22 +278,15 @@ def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: 
 
     halves = halve(1.0 - K)
     stability = float(stabilities(1.0 - K, halves, halve).min())
-    a, b = K[halves == 0], K[halves == 1]
-    between = float(a[:, halves == 1].mean())
-    within = _mean_within(a[:, halves == 0]) * _mean_within(b[:, halves == 1])
+    means, counts = mean_similarities(K, halves)
+    within = float(np.where(counts > 1, np.diag(means), 1.0).prod())  # 1 for a movement alone
     parts = np.empty(len(some), dtype=np.intp)
     parts[order] = halves
     nearest = compare(averaged(described, widths), described, described.take(some)).argmax(axis=1)
     parent = parts[nearest]
     parent[some] = parts
-    overlap = between / float(np.sqrt(max(within, np.finfo(float).tiny)))
+    overlap = float(means[0, 1]) / float(np.sqrt(max(within, np.finfo(float).tiny)))
     return Split(name, (indices[parent == 0], indices[parent == 1]), overlap, stability)
-
-
-def _mean_within(K: Array) -> float:
-    """Mean of different pairs; 1 for a movement alone."""
-    m = len(K)
-    return float((K.sum() - m) / (m * (m - 1))) if m > 1 else 1.0
 
 
 def _labeled(

@@ -87,10 +87,7 @@ def components(squares: Array) -> NDArray[np.intp]:
 
 
 def set_apart(similar: Array, component: NDArray[np.intp]) -> Array:
-    """Similarities in which small components, of fewer movements than a neighborhood has, are nearly alone.
-
-    The neighbors of such a movement are not all of its component, so that fusion connects it with whatever comes next.
-    """
+    """Similarities in which components smaller than a neighborhood, which fusion connects, are nearly alone."""
     few = np.bincount(component)[component] <= min(NEIGHBORS)
     apart = (component[:, None] != component) & (few[:, None] | few)
     return np.where(apart, _APART * similar, similar)
@@ -196,9 +193,8 @@ def _shared(clusters: Clusters, people: NDArray[np.intp] | None) -> bool:
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
     """Exactly `n_clusters` clusters of at least `min_members`, if there are enough movements; -1 is none.
 
-    Each movement becomes the direction of its entries in the first eigenvectors, as many as there are clusters. Average
-    linkage of the cosines of these directions is cut into so many clusters. Where some have too few members, these are
-    left over, and of the others the loosest is divided until there are enough.
+    By average linkage of the cosines of entries in as many eigenvectors. Clusters of too few members are left over, and
+    of the others the loosest is divided until there are enough.
     """
     wanted = max(1, min(n_clusters, len(similar) // min_members))
     n = len(similar)
@@ -226,8 +222,7 @@ def _by_directions(vectors: Array, wanted: int, min_members: int = 1) -> Cluster
 def _half(distances: Array, min_members: int) -> NDArray[np.bool_]:
     """Tell which of n movements are in the second of two parts, both of at least `min_members`.
 
-    Average linkage is cut into so many clusters that two are large enough; each movement goes with the nearer of them.
-    If none of its cuts is such, each goes with the nearer of the two that are farthest apart, in equal parts.
+    Each goes with the nearer of the first two large enough in cuts of the tree, else of the two farthest apart.
     """
     n = len(distances)
     tree = average_linkage(distances)

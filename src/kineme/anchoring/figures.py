@@ -147,8 +147,7 @@ def draw_proposals(movements: MovementsLike, proposals: Proposals, like: Compare
 
 def _side_by_side(axes: Any, paths: Array) -> None:
     """Movements that have nothing in common, side by side."""
-    n = len(paths)
-    columns = int(np.ceil(np.sqrt(n)))
+    columns = int(np.ceil(np.sqrt(len(paths))))
     for k, path in enumerate(paths):
         drawn = flat(path[None], path)[0]
         low = drawn.min(axis=1, keepdims=True)

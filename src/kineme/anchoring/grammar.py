@@ -147,10 +147,7 @@ def most_probable(grammar: Grammar, log_likelihoods: Array) -> NDArray[np.intp]:
 
 
 def posterior(grammar: Grammar, log_likelihoods: Array) -> Posterior:
-    """Return the probabilities of the symbols of a sequence, and the expected counts of transitions.
-
-    The grammar of the counts of many sequences, added up, is at least as probable as this one (Baum-Welch).
-    """
+    """Return the probabilities of the symbols of a sequence, and the counts of transitions for Baum-Welch."""
     initial, follow = _logs(grammar, log_likelihoods)
     n, K = log_likelihoods.shape
     counts = np.zeros((K + 1, K + 1))

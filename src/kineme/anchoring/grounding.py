@@ -224,7 +224,7 @@ def grounding_schema() -> dict[str, Any]:
 
 
 def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None) -> Primitives:
-    """The primitive of a grounding, bit for bit the one that was grounded; or that of another style.
+    """The primitive of a grounding, bit for bit, or of another style: a batch of one, labeled with the symbol's name.
 
     Parameters
     ----------
@@ -232,11 +232,6 @@ def primitive_from(grounding: Mapping[str, Any], style: ArrayLike | None = None)
         As `ground` gives it, or as JSON reads it.
     style : array_like of shape (J,), optional
         Style coordinates within the demonstrated range.
-
-    Returns
-    -------
-    Primitives
-        A batch of one, labeled with the symbol's name.
 
     Raises
     ------

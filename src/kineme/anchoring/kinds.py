@@ -31,26 +31,18 @@ _AXES = 3  # principal axes along which a kind is divided, beside the features t
 
 @dataclass(frozen=True, eq=False)
 class Kinds:
-    """K Gaussians over features of pieces, and what follows what.
+    """K Gaussians over features of pieces, and what follows what."""
 
-    - `means` (K, f), `roots` (K, f, f): means, and lower Cholesky factors of the covariances.
-    - `grammar`: of the kinds in the sequences that they were learned from.
-    """
-
-    means: Array
-    roots: Array
-    grammar: Grammar
+    means: Array  # (K, f)
+    roots: Array  # (K, f, f), lower Cholesky factors of the covariances
+    grammar: Grammar  # of the kinds in the sequences that they were learned from
 
     def __len__(self) -> int:
         return len(self.means)
 
 
 def describe_pieces(paths: Array) -> Array:
-    """Return features (n, 3 d) of pieces, of which paths (n, 3, d) hold begin, middle and end.
-
-    They are linear: the center of begin and end, the displacement end minus begin, and the bulge, the middle minus the
-    center.
-    """
+    """Return features (n, 3 d) of paths (n, 3, d): center of begin and end, end minus begin, middle minus center."""
     begin, middle, end = paths[:, 0], paths[:, 1], paths[:, 2]
     center = 0.5 * (begin + end)
     return np.concatenate((center, end - begin, middle - center), axis=1)
@@ -89,10 +81,9 @@ def log_densities(means: Array, roots: Array, features: Array) -> Array:
 def learn_kinds(features: Array, lengths: Sequence[int], n_correlated: int = 0, most: int = 40) -> Kinds:
     """Learn kinds from features (n, f) of pieces, in sequences of so many pieces (`lengths`).
 
-    A kind is divided while that lowers the Bayesian information criterion, up to `most` kinds (X-means, with
-    covariances). The first `n_correlated` features are correlated within a kind, or not: whichever has the lower
-    criterion for the data. Then kinds and grammar are learned together (Baum-Welch), so that what is alike and
-    follows other things comes apart.
+    A kind is divided while that lowers the Bayesian information criterion (X-means, with covariances), with the first
+    `n_correlated` features correlated within a kind, or not: whichever is lower. Then kinds and grammar are learned
+    together (Baum-Welch), so that what is alike and follows other things comes apart.
     """
     mixtures = []
     for correlated in {0, n_correlated}:

@@ -101,8 +101,7 @@ def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, 
     sizes = np.bincount(clusters[clusters >= 0], minlength=c)
     seed = np.array([np.flatnonzero(clusters == k)[0] for k in range(c)], dtype=np.intp)
     order = np.lexsort((seed, -sizes))
-    rank = np.append(np.argsort(order), -1)
-    ranked = rank[clusters]
+    ranked = np.append(np.argsort(order), -1)[clusters]
     H = (ranked[:, None] == np.arange(c)).astype(np.float64)
     sums = K @ H  # of each movement to each cluster
     between = (H.T @ sums) / np.maximum(np.outer(H.sum(0), H.sum(0)), 1.0)
@@ -333,10 +332,7 @@ def _by_neighbors(
 
 
 def by_shape(described: Described) -> Described:
-    """Without the forcing term, if movements are also compared pair by pair: across people it tells little.
-
-    What is compared in detail counts as the coarse ones, which are rotated: with more, clusters are those of people.
-    """
+    """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
     if described.pairs is None:
         return described
     n, own, coarse = len(described.blocks), described.own_weights, described.coarse()

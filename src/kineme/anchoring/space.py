@@ -186,8 +186,7 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     shifts = center + s[:, None] * (matrix @ center + back.shifts[0] - center) - matrices @ center
     theta = matrices @ theta
     theta[:, :, -3:-1] += shifts[:, :, None]
-    durations = a.durations * (b.durations / a.durations) ** s
-    return from_numbers(a.dmp, theta, durations)
+    return from_numbers(a.dmp, theta, a.durations * (b.durations / a.durations) ** s)
 
 
 def _part_rotation(R: Array, s: Array) -> Array:
@@ -196,7 +195,7 @@ def _part_rotation(R: Array, s: Array) -> Array:
 
     d = len(R)
     if d not in (2, 3):
-        return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()
+        return np.tile(np.eye(d), (len(s), 1, 1))
     in_space = np.eye(3)
     in_space[:d, :d] = R
     return np.asarray(

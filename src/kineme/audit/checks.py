@@ -1,14 +1,13 @@
 """Checks of an episode of robot data: one table of what each measures, what that means, and what to do about it.
 
-A check is a pure function of a `Motion`. It returns some values, of the whole episode, of each channel, or of its
-beginning and its end, each with the stretch of time that it is about. Values of checks whose `side` is "exact" count
-contradictions; all others say nothing before they are compared with those of other episodes, see
-`kineme.audit.calibrate`.
+A check is a pure function of a `Motion`: values, each with the stretch of time that it is about. Those whose `side` is
+"exact" count contradictions; all others are compared with those of other episodes, see `kineme.audit.calibrate`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -114,8 +113,7 @@ def repeats(motion: Motion) -> Measure:
     ends = ends[np.minimum(speed[ends[:, 0] - 1], speed[np.minimum(ends[:, 1], len(speed) - 1)]) > moving]
     if not len(ends):
         return _over_all(motion, 0.0)
-    count = np.log1p((ends[:, 1] - ends[:, 0]).sum())
-    return _at(motion, np.array([count]), ends[:1, 0], ends[-1:, 1])
+    return _at(motion, np.log1p([(ends[:, 1] - ends[:, 0]).sum()]), ends[:1, 0], ends[-1:, 1])
 
 
 def spikes(motion: Motion) -> Measure:
@@ -205,16 +203,10 @@ def still(motion: Motion) -> Measure:
     return _over_all(motion, *-np.log(np.ptp(motion.state, axis=0) + 1e-9))
 
 
-def highest(motion: Motion) -> Measure:
-    """Return the largest value of each channel."""
-    rows = motion.state.argmax(axis=0)
-    return _at(motion, motion.state.max(axis=0), rows, rows)
-
-
-def lowest(motion: Motion) -> Measure:
-    """Return the smallest value of each channel."""
-    rows = motion.state.argmin(axis=0)
-    return _at(motion, motion.state.min(axis=0), rows, rows)
+def extremes(motion: Motion, sign: int) -> Measure:
+    """Return the largest value of each channel, or with the sign -1 the smallest."""
+    rows = (sign * motion.state).argmax(axis=0)
+    return _at(motion, np.take_along_axis(motion.state, rows[None], axis=0)[0], rows, rows)
 
 
 def ends(motion: Motion) -> Measure:
@@ -334,12 +326,12 @@ CHECKS: tuple[Check, ...] = (
         lambda value: float(np.exp(-value)), by_task=True,
     ),
     Check(
-        "above", highest, "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
+        "above", partial(extremes, sign=1), "upper", 0.05, "{channel} goes up to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
         by_task=True, relative=True,
     ),
     Check(
-        "below", lowest, "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
+        "below", partial(extremes, sign=-1), "lower", 0.05, "{channel} goes down to {value:.3g} (usual: {usual:.3g})",
         "Another calibration, channels in another order, or a collision.", "Compare the calibration of that day.",
         by_task=True, relative=True,
     ),

@@ -70,47 +70,23 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Audit:
-    """Result of `audit_episodes`.
+    """Result of `audit_episodes`; where nothing is calibrated, the ten most unusual are "ranked", and not flagged."""
 
-    - `numbers` (n,): indices of all episodes; `p_values`, `evidence`, `flagged` (n,) are in the same order.
-    - `error_rate`: the stated share of good episodes that are flagged by chance; `by_chance` is the number of episodes
-      that this makes here, at most. 0 where there are too few to calibrate anything.
-    - `findings`: those flagged, contradictions first, then the most unusual; where nothing is calibrated, also the
-      ten most unusual, of the kind "ranked", which are not flagged.
-    - `of_the_set`: contradictions, and remarks of the reader, that more than half of the episodes share, each a
-      sentence; they flag none.
-    """
-
-    numbers: NDArray[np.int64]
+    numbers: NDArray[np.int64]  # (n,), of all episodes; the arrays below are in the same order
     seconds: float
     tasks: int
-    error_rate: float
-    by_chance: int
+    error_rate: float  # stated share of good episodes that are flagged by chance
+    by_chance: int  # episodes that this makes here, at most; 0 where there are too few to calibrate anything
     p_values: Array
     evidence: Array
     flagged: NDArray[np.bool_]
-    findings: tuple[Finding, ...]
-    of_the_set: tuple[str, ...]
+    findings: tuple[Finding, ...]  # contradictions first, then the most unusual
+    of_the_set: tuple[str, ...]  # contradictions and remarks that more than half of the episodes share; they flag none
 
     @property
     def calibrated(self) -> bool:
         """Tell if there are enough episodes for the stated rate."""
         return self.by_chance > 0
-
-
-class _Spool:
-    """Rows of float32 in the order of the episodes, in memory as long as they are small."""
-
-    def __init__(self, width: int) -> None:
-        self.width = width
-        self.file = tempfile.SpooledTemporaryFile(max_size=_IN_MEMORY)  # noqa: SIM115 - lives as long as the audit
-
-    def append(self, row: NDArray[np.float32]) -> None:
-        self.file.write(row.tobytes())
-
-    def read(self, row: int) -> NDArray[np.float32]:
-        self.file.seek(4 * row * self.width)
-        return np.frombuffer(self.file.read(4 * self.width), dtype=np.float32)
 
 
 class Measurement(NamedTuple):
@@ -160,7 +136,8 @@ class _Measured:
         self.names: tuple[str, ...] | None = None  # of the channels, those of the first episode that has some
         self.sizes: tuple[int, ...] = ()  # values of each check
         self.rows = bytearray()  # float32, of `sizes` values each
-        self.spool: _Spool | None = None
+        self.width = 0  # numbers that are spooled of each episode: `Measurement.drawn`, zeros where there are none
+        self.spool = tempfile.SpooledTemporaryFile(max_size=_IN_MEMORY)  # noqa: SIM115 - lives as long as the audit
 
     def add(self, episode: Measurement) -> None:
         """Add an episode; of what belongs to none, which has a negative number, keep the problems."""
@@ -183,37 +160,32 @@ class _Measured:
 
     def close(self) -> None:
         """Remove the temporary file."""
-        if self.spool is not None:
-            self.spool.file.close()
+        self.spool.close()
 
     def _keep(self, episode: Measurement | None, at: int) -> None:
-        if episode is None:
-            if self.spool is not None:
-                self.rows += np.full(sum(self.sizes), np.nan, dtype=np.float32).tobytes()
-                self.spool.append(np.zeros(self.spool.width, dtype=np.float32))
-            return
-        if self.spool is None:
-            self.sizes = episode.sizes
-            self.spool = _Spool(len(episode.drawn))
+        if episode is not None and not self.width:
+            self.sizes, self.width = episode.sizes, len(episode.drawn)
             for _ in range(at):
                 self._keep(None, at)
-        self.rows += episode.values.tobytes()
-        self.spool.append(episode.drawn)
+        none = np.full(sum(self.sizes), np.nan, dtype=np.float32), np.zeros(self.width, dtype=np.float32)
+        values, drawn = none if episode is None else (episode.values, episode.drawn)
+        self.rows += values.tobytes()
+        self.spool.write(drawn.tobytes())
+
+    def _drawn(self, row: int) -> NDArray[np.float32]:
+        self.spool.seek(4 * row * self.width)
+        return np.frombuffer(self.spool.read(4 * self.width), dtype=np.float32)
 
     def ways(self, rows: NDArray[np.intp]) -> Array:
         """Return the ways (m, d, 64) of some episodes."""
-        assert self.spool is not None
-        assert self.names is not None
-        size = len(self.names) * PATH
-        chosen = [self.spool.read(int(row))[:size] for row in rows]
-        return np.array(chosen, dtype=np.float64).reshape(len(rows), len(self.names), PATH)
+        d = len(self.names or ())
+        chosen = [self._drawn(int(row))[: d * PATH] for row in rows]
+        return np.array(chosen, dtype=np.float64).reshape(len(rows), d, PATH)
 
     def stretch(self, row: int, value: int) -> tuple[float, float]:
         """Return the stretch [s] of a value of an episode."""
-        assert self.spool is not None
-        assert self.names is not None
-        first = len(self.names) * PATH + 2 * value
-        start, end = self.spool.read(row)[first : first + 2].tolist()
+        first = len(self.names or ()) * PATH + 2 * value
+        start, end = self._drawn(row)[first : first + 2].tolist()
         return start, end
 
     def values(self) -> list[Array]:
@@ -237,11 +209,8 @@ def audit_episodes(
 ) -> Audit:
     """Find the episodes of a data set that are unlike the others, or contradict it; see `kineme.audit.calibrate`.
 
-    - `episodes`: read once, one at a time.
-    - `error_rate`: share of good episodes that may be flagged. It takes ``1 / error_rate`` episodes; with fewer, only
-      contradictions are flagged, and the others ranked.
-    - `progress`: called with the number of episodes that are done since the last call, twice for each: measured,
-      compared.
+    Episodes are read once. With fewer than ``1 / error_rate`` only contradictions are flagged, and the others ranked.
+    `progress` is called with the episodes done since the last call, twice for each: measured, compared.
     """
     return audit_measured(map(measure_episode, episodes), error_rate, progress)
 

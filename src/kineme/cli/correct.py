@@ -108,15 +108,17 @@ def _recordings(paths: tuple[Path, ...], options: dict[str, Any], library: Any, 
 
 def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: float) -> Any:
     """Return what was annotated: as it stands in the data set, else found again."""
-    from kineme.library.annotate import annotate
+    from kineme.library.annotate import annotate_by
     from kineme.library.correct import as_labels, motions_in
+    from kineme.library.recognize import some_of_each_symbol
 
     motions = motions_in(paths[0]) if len(paths) == 1 else []
     if motions:
         return as_labels(motions)
     total = float(parsed.demonstrations.durations.sum())
     with progress(total=total, desc="annotating as before", unit="s") as bar:
-        report = annotate(library.store, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
+        classes = some_of_each_symbol(library.store)
+        report = annotate_by(classes, parsed, error_rate, lambda done: bar.update(min(done, total) - bar.n))
     return as_labels(report.annotations)
 
 

@@ -32,22 +32,11 @@ class Annotated(NamedTuple):
     calibrated: bool  # True if the p-values of every symbol are, at the error rate, as in `Answer`; else a guess
 
 
-def annotate(
-    store: Store, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
-) -> Annotated:
-    """Find the movements of a library's symbols in long recordings, and unknown motion between them.
-
-    Each movement of the recordings is searched on its own, at an error rate as in `Recognizer.spot`. `progress` is
-    called now and then with the seconds of recordings that are done.
-    """
-    return annotate_by(some_of_each_symbol(store), recordings, error_rate, progress)
-
-
 @single_threaded_blas()  # of few rows at a time: a second thread mostly waits
 def annotate_by(
     classes: KnownClasses, recordings: Recordings, error_rate: float = 0.05, progress: Progress | None = None
 ) -> Annotated:
-    """Annotate by symbols that are prepared once for many recordings, see `some_of_each_symbol`."""
+    """Find movements of symbols, as of `some_of_each_symbol`, in long recordings, and unknown motion between them."""
     classes.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
     templates = Templates(classes.comparison, classes.references, classes.calibration)
     annotations: list[Annotation] = []
@@ -100,7 +89,7 @@ def find(
 ) -> Occurrences:
     """Search recordings for all symbols of a library, and return where they show one of `symbols`.
 
-    All symbols compete for a stretch, as in `annotate`, so that its certainty is calibrated; only the hits are held.
+    All symbols compete for a stretch, as in `annotate_by`, so that its certainty is calibrated; only the hits are held.
     `progress` is called after each piece with the seconds of recordings that are done.
     """
     classes = some_of_each_symbol(store)

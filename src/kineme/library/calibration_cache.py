@@ -92,13 +92,12 @@ def _key(store: Store, members: Members, content: bytes = b"") -> str:
 
 
 def _serialized(calibration: Calibration, key: str) -> bytes:
-    both = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
+    both = list(zip(calibration.pooled, calibration.pooled_novelties, strict=True))
     pooled = {(id(score), id(novelty)): (score, novelty) for score, novelty in both}  # classes of one size share arrays
     numbers = {name: k for k, name in enumerate(pooled)}
     arrays: dict[str, Any] = {f"pooled {k}": score for k, (score, _) in enumerate(pooled.values())}
     arrays |= {f"novelties {k}": novelty for k, (_, novelty) in enumerate(pooled.values())}
-    shared = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
-    arrays["which"] = np.array([numbers[id(score), id(novelty)] for score, novelty in shared])
+    arrays["which"] = np.array([numbers[id(score), id(novelty)] for score, novelty in both])
     for name, several in (("", calibration.own), ("novel ", calibration.own_novelties)):
         arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(scores) for scores in several])}
     file = io.BytesIO()

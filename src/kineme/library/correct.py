@@ -92,8 +92,7 @@ def motions_in(path: Path) -> list[Annotation]:
 def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
     """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of.
 
-    A stretch is as annotated if symbol and both ends are the same, to one sample. Others are compared with the
-    annotated one that shares most of the union with them. A `DataError` says that no row is of these recordings.
+    A stretch is as annotated if symbol and ends are the same, to one sample; others, by which shares most of the union.
     """
     after, problems = stretches_of(recordings, corrected)
     if not after:
@@ -155,8 +154,7 @@ def learn_corrections(
     examples = corrections.examples
     if not examples:
         return None
-    pieces = cut_stretches(recordings, examples)
-    report = learn_recordings(store, pieces, options, root=root)
+    report = learn_recordings(store, cut_stretches(recordings, examples), options, root=root)
     labels, names = [str(stretch.row.label) for stretch in examples], names_of(store, report.ids)
     for symbol in dict.fromkeys(label for label, name in zip(labels, names, strict=True) if label != name):
         others = [label == symbol != name for label, name in zip(labels, names, strict=True)]

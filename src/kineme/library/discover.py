@@ -117,11 +117,10 @@ class Observation(NamedTuple):
 def discover(
     episodes: Iterable[Episode], feature: str | None = None, how: Work | None = None, n_learned: int = _LEARNED
 ) -> Discovery:
-    """Find the kinds of movements in episodes, with names that their tasks propose.
+    """Find the kinds of movements in episodes, which are read once, with names that their tasks propose.
 
-    Episodes are read once, one at a time; those that cannot be used are among the problems of the result. Kinds are
-    described by a `feature`, see `state_of`; columns of grippers, contacts and objects in other features, by their
-    names, help to find boundaries. They are learned from about `n_learned` pieces; all are assigned to them.
+    They are described by a `feature`, see `state_of`; columns of grippers, contacts and objects in others help to find
+    boundaries. They are learned from about `n_learned` pieces, and all are assigned to them.
     """
     observations: list[Observation] = []
     problems: list[str] = []
@@ -157,10 +156,7 @@ def discover(
 
 
 def state_of(episode: Episode, feature: str | None = None) -> tuple[tuple[str, ...], Array]:
-    """Return the heads and the values (T, d) that kinds are described by, without columns of NaN.
-
-    By default those of `default_features`.
-    """
+    """Return the heads and values (T, d) of a feature, by default `default_features`, without columns of NaN."""
     chosen = (
         (feature,) if feature else default_features({name: values.shape[1] for name, values in episode.signals.items()})
     )
@@ -354,11 +350,7 @@ def store_discovery(
     feature: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:
-    """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version.
-
-    A person names the proposals, in the studio or by ``kineme anchor``. `progress` is called with the number of
-    episodes that are done.
-    """
+    """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version."""
     by_episode: dict[int, list[Segment]] = {}
     for segment in discovery.segments:
         if segment.kind is not None:

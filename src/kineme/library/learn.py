@@ -217,10 +217,7 @@ def _one_each(what: str, given: Any, n: int) -> list[Any]:
 def _as_origins(
     source: Source | Sequence[Source | None] | None, places: Sequence[Any] | None, n: int
 ) -> tuple[list[Source | None], list[str | None]]:
-    """Return the source of each movement and its position there, at which no other movement may be.
-
-    Without positions, duplicates are found by their samples alone.
-    """
+    """Return the source of each movement and its position there, at which no other movement may be."""
     sources: list[Source | None] = (
         [source] * n if source is None or isinstance(source, Source) else _one_each("source, or one", source, n)
     )
@@ -239,10 +236,9 @@ def _as_origins(
 
 
 def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """Compute BLAKE2b of the positions, other columns and times from the start of each movement, as 64-bit numbers.
+    """Compute BLAKE2b of what will be read of each movement, but its name, as 64-bit numbers.
 
-    Names do not count. They are of the numbers that will be read: a movement that is read and learned again has the
-    same one. The probability that any two of a million different movements have the same digest is 3e-8.
+    So a movement that is read and learned again has the same one. Two of a million others share one at p = 3e-8.
     """
     starts = np.repeat(demos.positions[demos.offsets[:-1]], demos.lengths, axis=0)
     positions = starts + (demos.positions - starts).astype(np.float32)
@@ -305,11 +301,9 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     root: str | PurePath = "",
     groups: Sequence[str | None] | None = None,
 ) -> LearnReport:
-    """Store the recordings of `kineme.io.reading.recordings.read_recordings` in the library of ``ActionLibrary.store``.
+    """Store recordings that were read with these options, as `ActionLibrary.learn`: with others it is another source.
 
-    The options are those of the reader: the same file read with others is another source. `root` is the folder that was
-    read, stored before the names of the files. By default the labels are those of the movements; groups and progress
-    are as for `ActionLibrary.learn`.
+    `root` is the folder that was read, stored before the names of files. Labels are by default those of the movements.
     """
     of_file = source_at(options or {}, root)
     files = {file.path: of_file(file.path, file.sha256, file.size) for file in recordings.sources}

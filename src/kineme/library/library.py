@@ -486,13 +486,7 @@ class ActionLibrary:
         changes.release(self.store, ids)
 
     def join(self, error_rate: float = 0.05) -> dict[str, int]:
-        """Add movements without a symbol to the symbols that they are recognized as.
-
-        Returns
-        -------
-        dict
-            Name of the symbol -> number of new members.
-        """
+        """Add movements without a symbol to those that they are recognized as; return name -> number of new members."""
         from kineme.library.proposals import assign_recognized, recognized
 
         return assign_recognized(self.store, recognized(self.store, error_rate))

@@ -64,10 +64,7 @@ def members_of(store: Store) -> Members:
 
 
 def groups_of(store: Store, ids: Ids) -> NDArray[np.intp] | None:
-    """Return numbers of who showed the movements, (k,), for a calibration; None where that is known of none.
-
-    Those of whom it is not known count as of one more person: nobody says that they are of different ones.
-    """
+    """Return numbers of who showed the movements, (k,), all unknown ones as one more; None where all are unknown."""
     people = read.groups(store, ids).tolist()
     if not any(people):
         return None

@@ -71,10 +71,7 @@ def propose(
     min_members: int = 3,
     joining: Recognized | None = None,
 ) -> LibraryProposals:
-    """Propose symbols for movements; see `ActionLibrary.propose`.
-
-    Movements that are `joining` a symbol are left out, and what is known of the symbols is taken from there.
-    """
+    """Propose symbols for movements but those `joining` one, by the classes there; see `ActionLibrary.propose`."""
     joining = Recognized() if joining is None else joining
     chosen = (
         np.setdiff1d(read.unlabeled_ids(store), joining.all_ids())
@@ -123,10 +120,7 @@ class NamedProposal:
 
 
 def store_proposals(store: Store, proposals: Sequence[NamedProposal]) -> int:
-    """Store proposals with names instead of those that were stored before; return the version.
-
-    `propose` gives them, in this order and before all others, as far as their movements have no symbol yet.
-    """
+    """Store proposals, which `propose` gives before all others, instead of those stored before; return the version."""
     detail = {
         "names": [proposal.name for proposal in proposals],
         "sizes": [len(proposal.members) for proposal in proposals],

@@ -70,10 +70,6 @@ class LibraryRecognizer:
             comparison, references, shared.hypotheses, Decision(confidence, patience), partial(self._answer, now)
         )
 
-    def model(self) -> KnownClasses | TwoStageSearch:
-        """Return the recognition of the symbols as they are now: by all of their movements, or in two stages."""
-        return self.current().model
-
     def current(self) -> Current:
         """Return the model of the symbols as they are now; one thread makes it, others wait."""
         with self._turn:
@@ -141,7 +137,7 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
     stored = StoredReferences(
         tuple(reduced.bases[r] for r in columns),
         tuple(tuple(block[r] for r in columns) for block in reduced.blocks),
-        reduced.rows(members.ids),
+        np.searchsorted(reduced.ids, members.ids),
         members.first,
         how,
         lambda rows: read.feature_blocks(store, reduced.ids[rows], how.stored_rows),
@@ -168,10 +164,7 @@ def monitor(
     noise: float | None,
     stream: Callable[[], Live],
 ) -> Monitor:
-    """Monitor by at most 500 of the movements, carried to a start and a goal if one is given.
-
-    Carried, positions are absolute, and the paths are those of the primitives, as a robot executes them.
-    """
+    """Monitor by at most 500 of the movements; by their primitives' absolute paths if a start or a goal is given."""
     if not len(ids):
         raise SpecificationError("expected a symbol with movements to monitor by, got one without any")
     ids = ids[evenly_spaced(len(ids), _MONITORED)]

@@ -46,10 +46,6 @@ class ReducedMovements:
     bases: tuple[Array, ...]
     blocks: tuple[tuple[ReducedFeatures, ...], ...]
 
-    def rows(self, ids: Ids) -> NDArray[np.intp]:
-        """Return rows of the reduced features of these movements."""
-        return np.searchsorted(self.ids, ids)
-
 
 def open_cache(store: Store, held: ReducedMovements | None = None) -> ReducedMovements:
     """Return reduced features of all movements ever stored: held or in the cache, and computed for those not in it."""

@@ -6,10 +6,11 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from fnmatch import fnmatch
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
+from shutil import copyfileobj
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -45,10 +46,7 @@ class Unit(NamedTuple):
 
 
 def is_remote(archive: str) -> bool:
-    """Tell whether an archive lies in an object store or another system that its URI names, as ``s3://bucket/fleet``.
-
-    The path of a folder, and ``file://``, are of this machine.
-    """
+    """Tell whether an archive lies in another system that its URI names, as ``s3://bucket/fleet``, not ``file://``."""
     return bool(_REMOTE.match(archive)) and not archive.startswith("file://")
 
 
@@ -75,11 +73,7 @@ def check_apart(output: str | Path, archives: Sequence[str]) -> None:
 
 
 def units_of(archives: Sequence[str], follow_links: bool = False) -> tuple[list[Unit], list[Problem]]:
-    """List what is to be read in archives, sorted by name, and what cannot be listed.
-
-    Only names, sizes and times are looked at, and of folders whether they are data sets. What is in two archives is
-    listed once.
-    """
+    """List what is to be read in archives, once each and sorted by name, and what cannot be listed."""
     units: list[Unit] = []
     problems: list[Problem] = []
     listed: set[Path] = set()
@@ -128,10 +122,7 @@ def _local_unit(archive: str, entry: Entry) -> Unit:
 
 @contextmanager
 def local_copy(unit: Unit) -> Iterator[Path]:
-    """Context manager: a folder that holds a unit under its name; of this machine, the folder that it lies in.
-
-    Files of a store are copied to a temporary folder, which is removed afterwards.
-    """
+    """Context manager: a folder that holds a unit under its name; of a store, a temporary one with copies."""
     archive = unit.archive
     if not is_remote(archive):
         path = path_at(archive)
@@ -154,13 +145,6 @@ def opened(unit: Unit) -> Any:
     return system.open_input_file(_path_of(base, unit.name, unit.archive))
 
 
-@contextmanager
-def local_copies(units: Sequence[Unit]) -> Iterator[list[Path]]:
-    """Context manager: `local_copy` of each of some units, all at once."""
-    with ExitStack() as stack:
-        yield [stack.enter_context(local_copy(unit)) for unit in units]
-
-
 def _within(folder: Path, name: str) -> Path:
     """Return the path of a name in a folder; names are data, and lead nowhere else."""
     parts = PurePosixPath(name).parts
@@ -177,8 +161,7 @@ def _path_of(base: str, name: str, archive: str) -> str:
 def _copy(system: Any, path: str, target: Path, file: File) -> None:
     try:
         with system.open_input_stream(path) as source, target.open("wb") as copy:
-            while chunk := source.read(_CHUNK):
-                copy.write(chunk)
+            copyfileobj(source, copy, _CHUNK)
     except FileNotFoundError as error:
         raise DataError(f"expected {file.name} in the archive, it has vanished since it was listed") from error
     except OSError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -28,7 +29,7 @@ from kineme.library.storage.specification import Specification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.pieces.archive import local_copies
+from kineme.pieces.archive import local_copy
 from kineme.pieces.planning import Piece
 from kineme.pieces.run import Source, noted
 
@@ -82,12 +83,10 @@ def _table(columns: Mapping[str, Any], tables: Tables) -> Any:
 def _recordings(
     source: Source, options: Options
 ) -> Iterator[tuple[Recordings, Sequence[str | None] | None, str | None]]:
-    """Yield the recordings of a piece with who showed them, and of a data set the checksums of its files.
-
-    What cannot be read is added to the problems of the source.
-    """
+    """Yield the recordings of a piece with who showed them, and of a data set the checksums of its files."""
     how = how_to_read(options["reading"])
-    with local_copies(source.piece.units) as folders:
+    with ExitStack() as copies:
+        folders = [copies.enter_context(local_copy(unit)) for unit in source.piece.units]
         entries = [
             Entry(folder / unit.name, Path(unit.name), unit.shown)
             for folder, unit in zip(folders, source.piece.units, strict=True)
@@ -105,10 +104,7 @@ def _recordings(
 
 
 def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> Iterator[Recordings | Problem]:
-    """Yield files as one set of recordings; one by one, if one that is unlike the others can be read alone.
-
-    Which of them are left out is said by the whole archive, not by a piece.
-    """
+    """Yield files as one set of recordings; one by one, if one that is unlike the others can be read alone."""
     if numbers is not None:
         yield from read_entry(entries[0], how.layout, how.rule, **how.switches, numbers=numbers)
         return

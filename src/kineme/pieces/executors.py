@@ -65,10 +65,9 @@ class _Process(NamedTuple):
 
 
 def _in_processes(job: Job, pieces: Sequence[Piece], workers: int, time_limit: float) -> Outcomes:
-    """Yield outcomes of processes with one thread each.
+    """Yield outcomes of processes with one thread each, which end with this one.
 
-    What is under way ends with this process, and when it is interrupted. When a process is ended from outside, its
-    piece is done again once all others are, alone, and fails if it ends its process a second time.
+    A piece whose process is ended is done again, alone, after all others, and fails if it ends that one, too.
     """
     with _processes(job) as (start, first):
         idle = [first, *(start() for _ in range(min(workers, len(pieces)) - 1))]
@@ -223,10 +222,7 @@ def _version() -> str:
 
 @contextmanager
 def cluster_client(address: str, timeout: float = 10.0) -> Iterator[Any]:
-    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``.
-
-    It waits so long for the scheduler to answer [s].
-    """
+    """Context manager: a client of the scheduler of a cluster of Dask at an address, as ``tcp://head:8786``."""
     with needs("distributed", "use a cluster of Dask", "cluster"):
         from distributed import Client
     try:

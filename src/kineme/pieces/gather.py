@@ -25,15 +25,11 @@ _NAMED = 3  # pieces that a message names
 
 @dataclass(frozen=True)
 class Asked:
-    """A command over the pieces of archives, as its folder keeps it.
+    """A command over the pieces of archives, as its folder keeps it; `plan` takes archives, size, and how to read."""
 
-    - `task`: a key of `TASKS`; `options` are those of its job.
-    - `archives`, `size`: what `plan` takes, with the options of reading.
-    """
-
-    task: str
+    task: str  # a key of `TASKS`
     archives: tuple[str, ...]
-    options: Mapping[str, Any]
+    options: Mapping[str, Any]  # of its job
     size: int = PIECE_BYTES
 
 
@@ -79,12 +75,8 @@ def write_run(output: Path, asked: Asked, *, replace: bool = False) -> None:
     """Write what is asked for into the folder of the parts, or check that it is what the folder has parts of."""
     output.mkdir(parents=True, exist_ok=True)
     text = json.dumps(vars(asked), ensure_ascii=False, sort_keys=True, indent=1)
-    with suppress(FileExistsError), whole_file(output / RUN, replace=False) as beside:
+    with suppress(FileExistsError), whole_file(output / RUN, replace=replace) as beside:
         beside.write_text(text, encoding="utf-8")
-        return
-    if replace:
-        with whole_file(output / RUN) as beside:
-            beside.write_text(text, encoding="utf-8")
         return
     before = read_run(output)
     if (before.task, _without_version(before.options)) != (asked.task, _without_version(asked.options)):

@@ -48,10 +48,7 @@ class Heads(NamedTuple):
         return frozenset() if columns.are_nameless else frozenset(columns.names)
 
     def unlike(self, most: Heads, by_number: bool) -> str | None:
-        """Say what keeps a file from being read with those of these columns; None if nothing does.
-
-        Columns without names, or chosen by their numbers, are taken in their order.
-        """
+        """Say what keeps a file from being read with those of these columns; None if nothing does."""
         if self.width != most.width:
             return f"{self.width} dimensions where most have {most.width}"
         if self.sensors != most.sensors and not by_number:
@@ -70,24 +67,16 @@ class Heads(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """All parts together, by what their rows say of files.
+    """All parts together, by what their rows say of files."""
 
-    - `heads`: text of the columns of files -> what it says.
-    - `unlike`: the same texts -> what keeps files from being learned, or None.
-    - `most`: the columns of most movements, in which all are learned.
-    - `learned`: the channels of these; None if there are files without names of columns, of which nothing is known.
-    - `sources`: name of a data set -> its checksum and its bytes; those of files are in their rows.
-    - `rows`: number of movements; `people`: who showed them; `notes`: what a person should know of the columns.
-    """
-
-    heads: Mapping[str, Heads]
-    unlike: Mapping[str, str | None]
-    most: Heads
-    learned: Channels | None
-    sources: Mapping[str, tuple[str, int]]
-    rows: int
-    people: Sequence[str]
-    notes: tuple[str, ...]
+    heads: Mapping[str, Heads]  # text of the columns of files -> what it says
+    unlike: Mapping[str, str | None]  # the same texts -> what keeps files from being learned, or None
+    most: Heads  # the columns of most movements, in which all are learned
+    learned: Channels | None  # the channels of these; None if files have columns without names
+    sources: Mapping[str, tuple[str, int]]  # name of a data set -> checksum and bytes; those of files are in their rows
+    rows: int  # movements
+    people: Sequence[str]  # who showed them
+    notes: tuple[str, ...]  # what a person should know of the columns
 
     def is_described(self, heads: Heads) -> bool:
         """Tell whether a file is described in the columns that are learned."""
@@ -143,10 +132,7 @@ def _compared(
 
 
 def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[Any, str]:
-    """Return the rows of an inspection of files in the columns of most, None without any, and these columns.
-
-    Other files are added to the problems, and so are those in other units: their rows are in their own.
-    """
+    """Return the rows of an inspection of files in the columns of most, and these; others are added to the problems."""
     import pyarrow as pa
     from pyarrow import compute
 
@@ -175,9 +161,8 @@ def inspected_alike(tables: Tables, asked: Asked, problems: list[str]) -> tuple[
 def _most(counts: list[tuple[Heads, int, int]]) -> tuple[Heads, tuple[str, ...]]:
     """Return the columns of most, from how many movements and files have each, and notes on kinds that differ.
 
-    So many recordings are read as one set, too: by the dimensions of most movements, then by the names of most files;
-    of equally many it is what is met first. A column that moves in some of them is not discrete; other kinds are those
-    of most files.
+    By the dimensions of most movements, then the names of most files, as recordings of one set. A column that moves in
+    some files is not discrete; other kinds are those of most.
     """
 
     def frequent(of: Callable[[Heads], Any], among: Sequence[tuple[Heads, int, int]], by_files: bool = True) -> Any:
@@ -227,8 +212,7 @@ def learned(
 ) -> Iterator[tuple[list[str | None], Committed]]:
     """Store the movements of all parts, and yield the labels of each batch with what came of it.
 
-    What is described in the columns of the library is written as it is; what is not is described again, from its
-    samples in single precision. Files whose columns do not fit are added to the problems. An undo takes back all.
+    What is not in the columns of the library is described again. Files that do not fit are added to the problems.
     """
     store.check_writable()
     if store.specification.to_json() != asked.options["specification"]:
@@ -254,7 +238,7 @@ def learned(
                         unlike.add(path)
                 continue
             batch = _batch(store, rows, of.heads[text], of, is_ours)
-            origins = list(zip(*(_texts(rows, name) for name in _ORIGIN), strict=True))
+            origins = list(zip(*(_texts(rows, name) for name in ("path", "sha256", "size")), strict=True))
             sources = {origin: source_of(*origin) for origin in dict.fromkeys(origins)}
             batch.sources = [sources[origin] for origin in origins]
             labels.append(batch.labels)
@@ -262,9 +246,6 @@ def learned(
 
     for committed in commit_batches(store, described()):
         yield labels.pop(0), committed
-
-
-_ORIGIN = ("path", "sha256", "size")
 
 
 def _texts(rows: Any, name: str) -> list[Any]:
@@ -283,14 +264,11 @@ def _batch(store: Store, rows: Any, heads: Heads, of: Survey, is_ours: bool) -> 
     if not is_ours:
         demos = in_columns_of(store, demos)
     check_channels(store, demos)
-    labels, people = (as_names(demos, what, _texts(rows, name)) for what, name in _SAID)
+    labels, people = as_names(demos, "label", _texts(rows, "label")), as_names(demos, "group", _texts(rows, "person"))
     if is_same and is_ours:
         return Batch(demos, _texts(rows, "digest"), labels, people, [], _texts(rows, "place"), rows_by_table(rows))
     check(demos)
     return Batch(demos, digests(demos, evenly_sampled(demos)), labels, people, [], _texts(rows, "place"))
-
-
-_SAID = (("label", "label"), ("group", "person"))
 
 
 def _sources(asked: Asked, of: Survey) -> Callable[[str, str, int], Any]:

@@ -40,7 +40,7 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
 
     Each piece of `plan` becomes a file ``part-*.parquet`` in the folder `output`, whole or not at all. Called again,
     pieces whose part is there and fits are skipped: nothing else remembers what is done. An exception fails its piece
-    and no other.
+    and no other. The outcomes are returned in the order of the plan, one of each piece.
 
     Parameters
     ----------
@@ -64,11 +64,6 @@ def map(  # noqa: A001, PLR0913 - as in the standard library, over movements
         Called with the outcome of each piece.
     **reading
         Options of `kineme.read_recordings`: ``columns``, ``label_by``, ...
-
-    Returns
-    -------
-    list of Outcome
-        One for each piece, in the order of the plan.
 
     Raises
     ------

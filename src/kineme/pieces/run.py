@@ -40,20 +40,13 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class Job:
-    """Work to do on every piece.
-
-    - `task`: its name.
-    - `work`: source -> tables of Arrow, the rows of its part; a function that pickle finds by its name.
-    - `output`: folder of the parts.
-    - `specification`: all that the rows depend on besides the piece, as plain data: another one makes parts stale.
-    - `ending`: ``.parquet``, or ``.arrow`` for parts that are mapped into memory.
-    """
+    """Work to do on every piece; `specification` is all that the rows depend on besides it, as plain data."""
 
     task: str
-    work: Callable[[Source], Iterable[Any]]
-    output: str
-    specification: Mapping[str, Any] = field(default_factory=dict)
-    ending: str = ".parquet"
+    work: Callable[[Source], Iterable[Any]]  # source -> tables of Arrow, its part; pickle finds it by its name
+    output: str  # folder of the parts
+    specification: Mapping[str, Any] = field(default_factory=dict)  # another one makes parts stale
+    ending: str = ".parquet"  # or ".arrow", for parts that are mapped into memory
 
     def path(self, piece: Piece) -> Path:
         """Return the part of a piece."""
@@ -107,10 +100,7 @@ class Part(NamedTuple):
 
 
 def run_piece(job: Job, piece: Piece) -> Outcome:
-    """Do a piece, unless its part is there and fits; whatever goes wrong is a failed outcome, and stops nothing.
-
-    The part appears whole or not at all, and is the same bytes whoever makes it. A full disk alone is an error here.
-    """
+    """Do a piece, unless its part is there and fits; whatever goes wrong but a full disk is a failed outcome."""
     before = time.process_time()
     path = job.path(piece)
     about = job.about(piece)
@@ -210,10 +200,7 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
 
 
 def recordings_of(source: Source, options: Mapping[str, Any], reference: Known | None = None) -> Iterator[Recordings]:
-    """Yield the recordings of a piece as `read_recordings` reads them, file by file, or some episodes at a time.
-
-    What cannot be read is added to the problems of the source.
-    """
+    """Yield the recordings of a piece as `read_recordings` reads them, file by file, or some episodes at a time."""
     layout, rule, switches, join = how_to_read(options, reference)
     if join:
         raise DataError("expected recordings that are read one by one, got --join-files; join them first")

@@ -246,8 +246,7 @@ def _log_bounds(plan: Plan, asked: tuple[ReducedFeatures, ...], stored: tuple[Re
     """Return the scores (n,) of rows."""
     points = plan.procrustes.by_points
     asked, stored = (tuple(part._replace(values=points(part.values)) for part in side) for side in (asked, stored))
-    bounds = log_bounds(plan.similarity, asked, stored)[0]
-    return np.asarray(bounds, dtype=np.float32)
+    return np.asarray(log_bounds(plan.similarity, asked, stored)[0], dtype=np.float32)
 
 
 def _keep(best: Best, scores: Single, rows: Rows) -> None:

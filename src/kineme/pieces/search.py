@@ -1,12 +1,10 @@
 """The nearest movements among all of an archive, whose features lie in shards: two stages, the first one exact.
 
-First the movements with the largest bounds of the similarity, see `kineme.pieces.scan`, by the representations that are
-compared sample by sample: the same as of a search of all, whatever shards they lie in and how many there are; of equal
-ones the first by path, place and start. These are then compared by all representations.
+First the movements with the largest bounds of the similarity, see `kineme.pieces.scan`, whatever shards they lie in; of
+equal ones the first by path, place and start. These are then compared by all representations.
 
-Indexes hold the rows of some shards together, in the order in which they are searched, in files beside them. An index
-is made when shards are opened for the first time, and again when they are others: its name says which they are. Where
-nothing can be written beside the shards, it is held in memory. Its arrays are mapped: processes share them.
+Indexes hold the rows of some shards, in the order in which they are searched, in files beside them, or in memory where
+nothing can be written. Their names say of which shards they are; processes share their arrays.
 """
 
 from __future__ import annotations
@@ -111,7 +109,10 @@ class Shards:
         """Make the indexes now, and remove those of shards that are there no more."""
         self.groups  # noqa: B018 - made on use
         groups = [self.shards[each.start : each.stop] for each in groups_of(self.shards, self.most)]
-        remove_others(self.folder, *self.plan, self.reduction, groups)
+        used = {f"{FOLDER}{_key(*self.plan, self.reduction, shards)}" for shards in groups}
+        for path in self.folder.glob(f"{FOLDER}*"):
+            if path.name not in used:
+                shutil.rmtree(path, ignore_errors=True)
 
     def nearest(self, movements: MovementsLike, n: int = 10, candidates: int = CANDIDATES) -> list[list[Near]]:
         """Return the `n` nearest of all movements to each of some in the columns of the library.
@@ -333,16 +334,6 @@ def open_group(folder: Path, plan: Plan, chosen: list[int], reduction: Reduction
         arrays = [np.load(path / f"{name}.npy", mmap_mode="r") for name in names]
         return Group(Index(*arrays[:4]), *arrays[4:])
     return group
-
-
-def remove_others(
-    folder: Path, plan: Plan, chosen: list[int], reduction: Reduction, groups: Sequence[Sequence[Shard]]
-) -> None:
-    """Remove indexes of shards that are there no more, or that are in other groups now."""
-    used = {_key(plan, chosen, reduction, shards) for shards in groups}
-    for path in folder.glob(f"{FOLDER}*"):
-        if path.name.removeprefix(FOLDER) not in used:
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def _key(plan: Plan, chosen: list[int], reduction: Reduction, shards: Sequence[Shard]) -> str:

@@ -51,34 +51,17 @@ _SPOILED = (OSError, ValueError, LookupError, TypeError, EOFError, BadZipFile, A
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """What all shards of a folder have in common.
+    """What all shards of a folder have in common."""
 
-    - `library`: the id of the library that it was fitted to.
-    - `specification`: how the feature rows of shards are described.
-    - `bases`: of each representation that is compared sample by sample, see `similarity.bounds.fit_bases`.
-    - `comparison`: of those representations of the specification that have a weight.
-    """
-
-    library: str
-    specification: ComparisonSpecification
-    bases: tuple[Array, ...]
-    comparison: Comparison
+    library: str  # id of that which it was fitted to
+    specification: ComparisonSpecification  # of the feature rows of shards
+    bases: tuple[Array, ...]  # of what is compared sample by sample, see `similarity.bounds.fit_bases`
+    comparison: Comparison  # of those representations of the specification that have a weight
 
     @cached_property
     def digest(self) -> str:
         """The checksum of the bases, which every shard names."""
         return bases_digest(self.bases)
-
-    @property
-    def selected(self) -> list[int]:
-        """Numbers of the representations of the specification that are compared."""
-        every = self.specification.representations
-        return [every.index(representation) for representation in self.comparison.representations]
-
-    @property
-    def rows_width(self) -> int:
-        """Numbers of the feature rows of a movement."""
-        return sum(self.comparison.n_dims * each.n_points for each in self.specification.stored_rows)
 
     def columns(self) -> list[slice]:
         """Return where in the reduced features of a movement those of each representation are, two norms last."""
@@ -120,10 +103,11 @@ def write_reduction(folder: Path, reduction: Reduction) -> Path:
             )
         return path
     channels, mixing = comparison.channels, comparison.procrustes.mixing
+    numbers = map(reduction.specification.representations.index, comparison.representations)
     about = {
         "library": reduction.library,
         "n_dims": comparison.n_dims,
-        "selected": reduction.selected,
+        "selected": list(numbers),
         "channels": None if channels is None else channels_to_text(channels),
         **Specification(reduction.specification).to_json(),
     }
@@ -349,7 +333,8 @@ def open_shard(path: Path, reduction: Reduction) -> Shard:
 
 
 def _check_columns(pa: Any, batches: Sequence[Any], reduction: Reduction) -> None:
-    widths = {"rows": reduction.rows_width, "reduced": reduction.columns()[-1].stop}
+    rows_width = reduction.comparison.n_dims * sum(each.n_points for each in reduction.specification.stored_rows)
+    widths = {"rows": rows_width, "reduced": reduction.columns()[-1].stop}
     kinds = dict.fromkeys(("place", "label"), pa.string()) | dict.fromkeys(("start", "duration"), pa.float64())
     kinds |= {name: pa.list_(pa.float32(), width) for name, width in widths.items()}
     for batch in batches:

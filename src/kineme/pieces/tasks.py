@@ -74,10 +74,7 @@ def annotation_schema() -> Any:
 
 
 def measurements(source: Source, options: Options) -> Iterator[Any]:
-    """Yield a row for each episode with what an audit compares: some numbers of it, not its signals.
-
-    Files of a folder are those that hold episodes; one of them that cannot be read is an episode with a problem.
-    """
+    """Yield a row for each episode with what an audit compares; a file that cannot be read is one with a problem."""
     import pyarrow as pa
 
     schema = measurement_schema()
@@ -123,10 +120,7 @@ def measured(table: Any) -> Iterator[tuple[str, Measurement]]:
 
 
 def numbered(rows: Iterable[tuple[str, Measurement]]) -> Iterator[Measurement]:
-    """Yield episodes with the numbers and places that `read_episodes` gives them, in its order.
-
-    The files of a folder are sorted by the numbers in their names, in memory.
-    """
+    """Yield episodes with the numbers and places that `read_episodes` gives them, in its order, sorted in memory."""
     rows = iter(rows)
     first = next(rows, None)
     if first is None or not first[0].lower().endswith(HDF5):
@@ -205,10 +199,7 @@ PLACES = ("library", "shards")  # options that say where something is, which mak
 
 
 def job_of(task: str, output: str, options: Options) -> Job:
-    """Return the job of a task with its options, which are plain data.
-
-    The folder of a library says where it is; parts depend on what it holds: its id and its version.
-    """
+    """Return the job of a task with its options, which are plain data."""
     if task not in TASKS:
         raise DataError(
             f"expected a command over pieces ({', '.join(TASKS)}), got {task!r:.40}; a later kineme may know it"

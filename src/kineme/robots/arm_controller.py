@@ -205,10 +205,9 @@ class ArmController:
 class LiveKinematics(descent.InverseKinematics):
     """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
 
-    A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
-    still brake at its end. The least squares of `InverseKinematics` are solved within the velocities of `Braking`. Far
-    from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of reach
-    comes to rest. `velocities` and `accelerations` (n,) are those of the joints in the last step; 0 at first.
+    A step asks for the pose's own motion, and for that part of the gap to it which the joints can still brake at its
+    end, by the least squares of `InverseKinematics` within the velocities of `Braking`. It is damped in proportion to
+    the distance, so that an arm stretched towards a pose out of reach comes to rest.
     """
 
     def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:

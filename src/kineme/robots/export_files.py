@@ -86,10 +86,7 @@ def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC)
 
 
 def _fill(writer: Any, trajectory: JointTrajectory, topic: str, *, is_ros1: bool) -> None:
-    """Write a JointTrajectory, whose time stamp 0 controllers take as now, and a JointState for each sample.
-
-    Discrete channels are further names of the latter.
-    """
+    """Write a JointTrajectory, whose time stamp 0 controllers take as now, and a JointState of each sample."""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
@@ -196,7 +193,7 @@ def write_lerobot(
     robot: str | Robot = "arm",
     joint_units: str = "deg",
 ) -> int:
-    """Write one episode into a new data set of version 3.0, or behind the others of one that is there.
+    """Write an episode into a new data set of version 3.0, or behind others of one that is there; return its number.
 
     ``observation.state`` holds the positions of the joints, as ``shoulder_pan.pos``, and under their names the channels
     beside them as of a gripper, at ``k / fps`` seconds. The names and units of joints are those that LeRobot's drivers
@@ -217,11 +214,6 @@ def write_lerobot(
     joint_units : {"deg", "rad", "percent"}, default "deg"
         Degrees, which the drivers take unless ``use_degrees`` is False; radians; or, with a `Robot`, -100 to 100
         between the limits of each joint in its URDF: calibrate the arm so that its limits are these.
-
-    Returns
-    -------
-    int
-        Number of the episode.
 
     Raises
     ------

@@ -20,7 +20,7 @@ from kineme.kernels.pair_distances import Shapes
 from kineme.kernels.procrustes import Procrustes
 from kineme.library.grounding import prototype_of
 from kineme.library.library import ActionLibrary
-from kineme.library.members import Members, members_of
+from kineme.library.members import Members, members_of, some_of_each
 from kineme.library.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
@@ -41,7 +41,6 @@ from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.early import evidence
 from kineme.recognition.early import hypotheses as beginnings
 from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison
 from kineme.similarity.describe import N_POINTS, Pairs, even_paths, feature_rows
 from kineme.similarity.scores import Classifier
@@ -280,12 +279,10 @@ def early_parts(classes: KnownClasses, early: Early | None = None) -> Snapshot:
 
 
 def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
-    """Header and arrays of C primitives, one of each class, and of their specification.
+    """Header and arrays of C primitives, one of each class, and with `learns` of what fits other movements.
 
-    With `learns`, the matrices are among them that fit other movements, and the same ones in other formulations.
-    Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
-    no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`
-    differs.
+    Weights are in single precision, as libraries store them. The matrix that fits the path has no goal in it, so that
+    the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal` differs.
     """
     dmp = primitives.dmp
     header = {
@@ -308,23 +305,17 @@ def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
 
 
 def snapshot_of_primitive(primitive: Primitives | PosePrimitives) -> Snapshot | None:
-    """A batch of one, for `openPrimitive` of the runtime; None if not every column is a position.
-
-    Angles, orientations and discrete values are written in other columns than those that move, which the runtime does
-    not know.
-    """
+    """A batch of one, for `openPrimitive` of the runtime; None unless every column is a position, all that it knows."""
     if isinstance(primitive, PosePrimitives) or any(channel.kind != "position" for channel in primitive.channels or ()):
         return None
     return movement_parts(primitive, learns=False)
 
 
 def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: Early | None = None) -> Snapshot:
-    """The symbols of a library with their movements.
+    """The symbols of a library with `most` of their movements, equally many of each, as if it held these alone.
 
-    Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
-    many as fit into 2 MB, 451 in the plane and 300 in space, or half of that if all of them pause. Widths and
-    calibration are those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how
-    many. `early` is how movements are recognized under way; by default as `kineme.Recognizer.stream` does.
+    By default as many as fit into 2 MB, 451 in the plane and 300 in space, or half of that if all of them pause;
+    ``header["n_all"]`` says of how many. `early` is how movements are recognized under way.
     """
     store = library.store
     members = members_of(store)
@@ -377,12 +368,7 @@ def some_members(members: Members, most: int) -> Members:
     each = int(counts.max(initial=1))
     while np.minimum(counts, each).sum() > most:
         each -= 1
-    chosen = np.concatenate(
-        [start + evenly_spaced(int(n), min(each, int(n))) for start, n in zip(members.first, counts, strict=True)]
-    )
-    first = np.concatenate(([0], np.cumsum(np.minimum(counts, each))[:-1])).astype(np.intp)
-    groups = None if members.groups is None else members.groups[chosen]
-    return Members(members.ids[chosen], members.names, first, groups)
+    return some_of_each(members, each)
 
 
 def _snapshot(classes: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:

@@ -98,8 +98,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
                 change, target, parents=json.dumps([*parsed_column("symbol_state", target, "parents", list), *parents])
             )
         for state in merged:
-            members = _leave(change, "symbol = :key", {"key": state[1]})
-            _move_members(change, members, key)
+            _move_members(change, _leave(change, "symbol = :key", {"key": state[1]}), key)
             change.retire("symbol_state", [state])
     return change.version
 
@@ -128,11 +127,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
 def assign(
     store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None, description: str | None = None
 ) -> int:
-    """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
-
-    A symbol that is created has the medoid as its prototype, if that is among the movements. The description is set if
-    one is given.
-    """
+    """Assign movements to a symbol, created if needed, then with the medoid as prototype; they leave the one before."""
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
     values: dict[str, Any] = {}

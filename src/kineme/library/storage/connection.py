@@ -146,10 +146,7 @@ def check_kind(connection: sqlite3.Connection, path: Path) -> int:
 
 
 def _check_definitions(connection: sqlite3.Connection, path: Path, version: int) -> None:
-    """Refuse a database whose definitions differ from the tables and indexes of a library in any character.
-
-    A trigger could change what is written; a view or a computed column could return anything, or run forever.
-    """
+    """Refuse definitions that differ from those of a library in any character: a trigger or view could do anything."""
     encoding = connection.execute("PRAGMA encoding").fetchone()[0]
     expected = _definitions(statements(version))
     stored = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
@@ -223,10 +220,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def new_database(path: Path) -> Iterator[Path]:
-    """Context manager: a name beside `path` for a new database, which is renamed to `path`, if that does not exist.
-
-    A FileExistsError if it does, or if another process was faster; it is unchanged.
-    """
+    """Context manager: a name beside `path` for a new database, renamed to `path`; a FileExistsError if that exists."""
     if not path.exists():
         remove_leftovers(path.parent, ".+", _is_library)  # of any name: that of an export is often never used again
     with whole_file(path, replace=False, companions=OF_SQLITE) as beside:

@@ -46,10 +46,9 @@ def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
 
 
 def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) -> Path | Address:
-    """Create a library in `folder`, or at an address, from a file of `export`, after checking every byte and value.
+    """Create a library in `folder`, or at an address, from a file of `export`, which may come from anywhere.
 
-    The file may come from anywhere: a copy of it is checked, by a connection on which nothing in the file can run, and
-    becomes a library only if its definitions and values are those of a library.
+    Every byte and value of a copy is checked, by a connection on which nothing in the file can run.
     """
     source, location = Path(path), as_location(folder)
     if isinstance(location, Address):
@@ -85,7 +84,10 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
                 if sqlite.check_kind(copy, source) < SCHEMA_VERSION:
                     sqlite.migrate(copy, source)
                 copy.execute("PRAGMA journal_mode = WAL")
-            _check(beside, source, wait)
+            with closing(Store(beside, read_only=True, wait=wait)) as store:
+                problems = verify(store, pages=False)
+            if problems:
+                raise _refusal(source, len(problems), str(problems[0]))
     return target
 
 
@@ -97,13 +99,6 @@ def _check_structure(beside: Path, source: Path, wait: float) -> None:
         verdict = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
         if verdict != "ok":
             raise _refusal(source, 1, f"the file: {' '.join(verdict.split())}")
-
-
-def _check(beside: Path, source: Path, wait: float) -> None:
-    with closing(Store(beside, read_only=True, wait=wait)) as store:
-        problems = verify(store, pages=False)
-    if problems:
-        raise _refusal(source, len(problems), str(problems[0]))
 
 
 def _refusal(source: Path, n: int, first: str) -> DataError:

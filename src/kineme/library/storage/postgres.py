@@ -5,10 +5,9 @@ The rest of the storage speaks the SQL of SQLite; here its statements are transl
 - Columns have types, so that a check of a type becomes one of presence.
 - Rows are added by COPY.
 - Writers take turns by advisory locks. Whoever changes what is there holds the lock of the library throughout. Whoever
-  learns holds it only to reserve keys, behind those of all who learn: each of these holds locks that say where its keys
-  end. Then it writes, beside them, waits for the one before it, and commits if that one did. So versions follow one
-  another, and the keys of all rows, without gaps. Where two learn the same at the same time, or one fails, the unique
-  indexes and the order of versions show it: it is written again, with other keys.
+  learns holds it only to reserve keys, behind those of all who learn, whose locks say where these end; it writes beside
+  them, and commits if the one before it did, so that versions and keys have no gaps. Where two learn the same, or one
+  fails, unique indexes and the order of versions show it: it is written again, with other keys.
 """
 
 from __future__ import annotations
@@ -135,8 +134,7 @@ _COPY = {
 def definitions(statements: Sequence[str]) -> list[str]:
     """Return the statements that create a library, or a part of it, on a server.
 
-    References are not enforced: nothing is deleted, and `verify` checks them. Bytes are not compressed, which floats
-    would not gain by, and lie in the row as far as a page has room.
+    References are not enforced, as `verify` checks them; bytes are not compressed, which floats would not gain by.
     """
     result = []
     for statement in statements:
@@ -151,10 +149,7 @@ def definitions(statements: Sequence[str]) -> list[str]:
 
 
 class ServerConnection:
-    """A connection to the schema of a library, for one thread at a time.
-
-    It is opened again where it was cut outside of a transaction, as after a restart of the server.
-    """
+    """A connection to the schema of a library, for one thread at a time; opened again where it was cut in between."""
 
     def __init__(self, address: Address, wait: float, *, read_only: bool = False) -> None:
         with needs("psycopg", "open a library on PostgreSQL", "postgres"):
@@ -327,10 +322,7 @@ class ServerConnection:
             self.run("SELECT pg_advisory_xact_lock_shared(%s, %s)", [place, end])
 
     def _ends(self) -> list[tuple[int, int]]:
-        """Return the locks of writers under way: number of the table, and the last key reserved in it, `% _KEYS`.
-
-        One that ends releases its locks one after another; without that of its version it is under way no more.
-        """
+        """Return the locks of writers under way, that hold one of a version: table, and last key in it `% _KEYS`."""
         query = """WITH held AS (
             SELECT pid, classid::bigint AS place, objid::int AS key FROM pg_locks
             JOIN pg_database ON pg_database.oid = database WHERE datname = current_database() AND granted

@@ -32,10 +32,7 @@ _UNIQUE = {"movement_digest", "movement_place", "symbol_name", "symbol_now", "me
 
 
 class PostgresStore(Store):
-    """The open library in a schema of a database on a server; as `Store`, with an address instead of a path.
-
-    Caches lie in a folder of the user's own.
-    """
+    """The open library in a schema of a database on a server; as `Store`, with an address instead of a path."""
 
     path: Address
     many_write = True
@@ -123,10 +120,7 @@ class PostgresStore(Store):
 
     @contextmanager
     def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
-        """Context manager: the library as a database of SQLite, in a file that has no name; all rows with their seals.
-
-        Those that say how the tables are defined are its own.
-        """
+        """Context manager: the library as a database of SQLite without a name; of its rows, "schema" alone differs."""
         with closing(sqlite3.connect("", isolation_level=None)) as database:
             define(database, {})
             seals = {"schema": database.execute("SELECT * FROM meta").fetchone()}

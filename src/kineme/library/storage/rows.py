@@ -43,11 +43,7 @@ def seal(table: str, row: Row) -> int:
 
 
 def insert(connection: Database, table: str, rows: Sequence[Row]) -> None:
-    """Add rows, in the order of `COLUMNS`, each with its seal.
-
-    Many rows per statement: between two statements the GIL changes hands, and with one statement per row the writing
-    thread would mostly wait for the thread that describes the next movements.
-    """
+    """Add rows, in the order of `COLUMNS`, each with its seal; many per statement: between two the GIL moves."""
     if copy_rows := getattr(connection, "copy_rows", None):  # of a server
         copy_rows(table, [(*row, seal(table, row)) for row in rows])
         return

@@ -3,18 +3,11 @@
 According to its authors, SQLite is safe with hostile files if it is set not to trust the definitions in them; see
 "Defense Against The Dark Arts", sqlite.org/security.html. It could still cost time and disk: both have limits.
 
-Before a fork all connections are closed; both sides open them again when needed.
-
-SQLite keeps in the memory of a process which locks its open connections hold on a file. A fork copies that memory but
-not the locks, which the system keeps per process. A child that uses a connection of its parent, or opens its own while
-the copied memory lists the parent's locks, assumes locks that it does not hold: it reads while others overwrite, writes
-into a log that the parent deletes, or waits forever for a transaction of a thread that does not exist. It must not
-close inherited connections either: that would roll back a transaction of the parent in shared memory. So no connection
-may be open at the fork. Closing one releases its locks and writes the log into the file, and both sides start afresh.
-
-A fork waits until no thread reads or writes, and threads wait until it is done; transactions are short. If that takes
-longer than `_PATIENCE`, or if the fork is not one that Python prepares, connections stay open in the parent, and the
-child refuses to use that library file.
+SQLite keeps in memory which locks its connections hold. A fork copies that memory but not the locks: a child that uses
+a connection of its parent, or opens its own, assumes locks that it does not hold, reads while others overwrite, or
+waits forever; and closing an inherited one would roll back a transaction of the parent. So a fork waits until no thread
+reads or writes, all connections are closed, and both sides open them again when needed. If that takes longer than
+`_PATIENCE`, or if Python does not prepare the fork, the child refuses to use that library file.
 """
 
 from __future__ import annotations
@@ -37,7 +30,6 @@ _STEPS = 200_000  # of SQLite's virtual machine between two checks of the limits
 #: Limit of steps for one statement: a minimum, and a number per byte of the file. Reading takes up to three steps per
 #: byte of a row, and a hundredth of that for stored features; pages that refer to each other in circles exceed it.
 _WORK, _WORK_PER_BYTE = 10_000_000, 10
-_ROOM = 1 << 24  # bytes that a copy may have beyond twice the size of the file
 _SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # limit of time, with an amount per byte that slow disks keep
 
 #: Settings that Python can change from 3.12 on, by name: features that a library does not need, and features that do
@@ -170,12 +162,6 @@ def limited(connection: Connection, path: Path) -> AbstractContextManager[None]:
     """Interrupt, within the context, also once all statements together take too long for the size of the file."""
     end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
     return connection.stopping(lambda: time.monotonic() > end)
-
-
-def limited_copy(connection: Connection, path: Path, copy: Path) -> AbstractContextManager[None]:
-    """Interrupt, within the context, also once the copy is far larger than the file."""
-    most = 2 * size_of(path) + _ROOM
-    return connection.stopping(lambda: size_of(copy) > most)
 
 
 def is_lost(path: Path | Address) -> bool:

@@ -28,6 +28,7 @@ from kineme.movements.channels.channel import Channels
 Result = TypeVar("Result")
 
 _TRIES = 4  # of a change that others get in the way of
+_ROOM = 1 << 24  # bytes that a copy may have beyond twice the size of the file
 
 NOW = LARGEST_ID  # later than every version: the current state
 
@@ -35,8 +36,7 @@ NOW = LARGEST_ID  # later than every version: the current state
 class Store:
     """The open database of a library, which is created by the specification if there is none.
 
-    Caches that can be built again may be beside it. With `as_of`, it shows the library as it was at that version, for
-    reading. `wait` is the time for which it waits for another writer [s].
+    With `as_of`, it shows the library as it was at that version. It waits so long for another writer [s].
     """
 
     path: Any  # of the file; of a library on a server, its address
@@ -161,11 +161,9 @@ class Store:
     @contextmanager
     def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
         """Context manager: the library as a database of SQLite of which a copy is written, within limits."""
-        with (
-            closing(sqlite.connect(self.path, "ro", self.wait)) as connection,
-            safety.limited_copy(connection, self.path, copy),
-        ):
-            yield connection
+        most = 2 * size_of(self.path) + _ROOM
+        with closing(sqlite.connect(self.path, "ro", self.wait)) as file, file.stopping(lambda: size_of(copy) > most):
+            yield file
 
     @contextmanager
     def snapshot(self) -> Iterator[Database]:
@@ -209,10 +207,7 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Database]:
-        """Context manager: the connection to read from, which sees only committed versions.
-
-        One thread reads at a time; it may nest readings.
-        """
+        """Context manager: the connection to read committed versions from, of one thread at a time, also nested."""
         with safety.awake(), sqlite.in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             safety.refuse_if_lost(self.path)
@@ -254,8 +249,7 @@ class Store:
     ) -> Iterator[Change]:
         """Context manager: one transaction, which becomes one version; its `detail` is stored in the history.
 
-        `reserve` is how many rows it adds to each table whose rows are numbered, if that is known, for stores in which
-        `many_write`: a ConflictError if it adds others, or if what others write does not fit; nothing is stored then.
+        `reserve` is how many rows it adds to numbered tables, if `many_write`: a ConflictError if these are others.
         """
         with safety.awake(), sqlite.in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
@@ -286,10 +280,7 @@ class Store:
                         raise sqlite.ConflictError(f"expected {dict(reserve)} rows, got others; run it again")
 
     def check_writable(self) -> None:
-        """Refuse to write if opened for reading, or if the file is no longer the one that was opened.
-
-        Writes to a deleted file would succeed and be lost.
-        """
+        """Refuse to write if opened for reading, or if the file is another one: what a deleted one gets is lost."""
         if self.read_only:
             raise DataError(
                 f"expected to write to {self.path}, but it is open for reading only; open it again to write"

@@ -125,10 +125,7 @@ def _members(connection: sql.Database, keys: list[int], moment: Moment) -> dict[
 
 
 def check_name(name: Any) -> str:
-    """Check a name: any Unicode text is allowed, with separators, quotes and control characters.
-
-    Except U+0000, which NumPy, C and shells treat as the end of a text.
-    """
+    """Check a name: any Unicode text without U+0000, which NumPy, C and shells treat as the end of a text."""
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
     sql.check_text("a name", name, MAX_TEXT)
@@ -175,11 +172,7 @@ def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> N
 
 
 def symbol_report(store: Store, who: str) -> dict[str, Any]:
-    """Return a symbol as plain data.
-
-    It has ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name,
-    file, position in the file, person, n_samples, duration [s], start and goal.
-    """
+    """Return a symbol as plain data, with a record of each of its ``members``."""
     shown = symbol(store, who)
     members = []
     if len(shown):

@@ -15,14 +15,11 @@ _DIGEST, _PROTOTYPE = COLUMNS["movement"].index("digest"), COLUMNS["symbol_state
 
 
 class Undone(NamedTuple):
-    """Result of `undo`: it made `version`, whose state is that of version `to`.
-
-    `action` is what it took back; "restore" where it was asked for that version.
-    """
+    """Result of `undo`: the version that it made."""
 
     version: int
-    to: int
-    action: str
+    to: int  # the version whose state it has
+    action: str  # that it took back; "restore" where it was asked for that version
 
 
 @repeated

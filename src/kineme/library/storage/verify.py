@@ -152,10 +152,7 @@ def _problem(table: str, key: Any, words: str) -> Problem:
 
 
 def verify(store: Store, *, pages: bool = True) -> list[Problem]:
-    """Return all problems of the library at one moment; an empty list if there are none.
-
-    `pages` is False if the pages of the file have been checked already.
-    """
+    """Return all problems of the library at one moment, also of the pages of its file unless these were checked."""
     with store.snapshot() as connection:
         pages = pages and isinstance(connection, sqlite3.Connection)  # a server checks its own
         return problems_of(connection, store, pages=pages)

@@ -134,10 +134,9 @@ def _path(trajectory: JointTrajectory) -> PPoly:
 
 
 def dense_times(robot: Robot, trajectory: JointTrajectory) -> Array:
-    """The times of the samples, and evenly between them so many that no joint moves farther than 0.05 rad or m.
+    """The times of the samples, and so many between that no joint moves farther than 0.05 rad or m, as its speed says.
 
-    Its speed is that at the samples, or from one to the next on average, but not beyond its limit: where it is faster
-    in between, it moves up to twice as far.
+    That is the speed at samples or the mean between, within its limit: where it is faster, it moves twice as far.
     """
     times = trajectory.times
     gaps = np.diff(times)[:, None]
@@ -231,10 +230,7 @@ def knows_masses(robot: Robot) -> bool:
 
 
 class Torques:
-    """Torques of one arm, posture by posture: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio.
-
-    Without friction, and without a load that the model does not have.
-    """
+    """Torques of one arm without friction: inverse dynamics by the recursive Newton-Euler algorithm of Pinocchio."""
 
     def __init__(self, robot: Robot) -> None:
         import pinocchio

@@ -97,10 +97,7 @@ def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
 
 
 def between_samples(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
-    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not.
-
-    Between samples lies what `between` says. Its acceleration overshoots where that of the movement is a step.
-    """
+    """Positions, velocities and accelerations at their worst instant, whether a sample lies there or not."""
     for order, (limits, centers) in enumerate(_limits(robot)):
         yield _limited(robot, order, extreme(trajectory, order, limits, centers), _SLACK_BETWEEN, SAMPLING)
 
@@ -199,8 +196,7 @@ class Steps(NamedTuple):
 def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> Check:
     """Every value of the channel is there, in the same order, and what changed while the arm stood does so still.
 
-    Too few samples lose a short pulse; the fastest timing leaves out the time in which an arm stands and waits for its
-    gripper. What changes in motion as it was generated passes; the fastest of these is said, without a limit.
+    Too few samples lose a short pulse, and the fastest timing the time in which an arm waits for its gripper.
     """
     name, sent = generated.name, trajectory.steps[generated.name]
     # The samples from which another value holds.
@@ -285,20 +281,18 @@ def preflight_table(preflight: Preflight) -> Table:
 
 def checks_as_data(preflight: Preflight) -> list[dict[str, Any]]:
     """List the checks as plain data; None where a number is not finite."""
-
-    def finite(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return [{name: finite(value) for name, value in check._asdict().items()} for check in preflight.checks]
+    rows = [check._asdict() for check in preflight.checks]
+    return [
+        {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in row.items()} for row in rows
+    ]
 
 
 def tracking(
     robot: Robot, trajectory: JointTrajectory, path: TaskPath, follow: str, dense: tuple[Array, Along]
 ) -> Iterator[Check]:
-    """Check how far the tip is from its path, and how far turned from it.
+    """Check how far the tip is from its path, and how far turned, without limit where that is followed in part alone.
 
-    Arms of fewer than six joints follow an orientation only as far as the position allows: of theirs, and of what is
-    not followed at all, the angle has no limit. Where the times of `dense` end with the path's, it is computed already.
+    Where the times of `dense` end with the path's, it is computed already.
     """
     times, state = dense
     n = len(path.times)
@@ -381,10 +375,9 @@ def contacts_of(robot: Robot, positions: Array) -> tuple[Contact, ...]:
 
 @lru_cache(maxsize=8)
 def _pair_geometry(robot: Robot) -> tuple[Any, Array]:
-    """The arm's shapes with the pairs that can touch, and the margin of each pair [m].
+    """The arm's shapes with the pairs that can touch, and the margin of each [m], 0 where it is passed at rest.
 
-    None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
-    axis do. Links that are within the margin of one another where the arm rests, without touching, have none.
+    Neighboring links are no pairs, and those that touch in nearly all postures, by design.
     """
     import pinocchio
 

@@ -59,10 +59,9 @@ class Reached(NamedTuple):
 def descend(
     robot: Robot, joints: Array, positions: Array, rotations: Array, turn_costs: Array, n_steps: int
 ) -> Reached:
-    """Steps of damped least squares (Levenberg and Marquardt) towards poses of the tip.
+    """Step from `joints` (m, n) to poses (m, 3), (m, 3, 3), by damped least squares (Levenberg and Marquardt).
 
-    Steps from `joints` (m, n) to poses (m, 3) and (m, 3, 3) minimize what those of `InverseKinematics` do, whose costs
-    `turn_costs` are; joints that come to a stop stay there, and the others do their part.
+    They minimize what `InverseKinematics` does; joints that come to a stop stay there, and the others do their part.
     """
     q = np.array(joints, dtype=float)
     weights = np.concatenate((np.ones(3), turn_costs))
@@ -139,10 +138,9 @@ def kinematics(robot: Robot, joints: Array) -> tuple[Array, Array, Array]:
 
 
 def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, n_starts: int = _STARTS) -> Reached:
-    """Joint positions that bring the tip to one pose, from the rest posture and from others spread over the limits.
+    """Joint positions that bring the tip within 0.1 mm of a pose, from rest and from others; the most exact first.
 
-    Two that differ by less than 0.3 rad in every joint count as one. The most exact comes first; if none comes within
-    0.1 mm, it is alone.
+    It is alone if none does. Two that differ by less than 0.3 rad in every joint count as one.
     """
     reached = descend(robot, _starts(robot, n_starts), position, rotation, turn_costs, _STEPS)
     order = np.argsort(reached.errors, kind="stable")
@@ -183,10 +181,7 @@ class TaskPath(NamedTuple):
 def task_path(
     times: Array, positions: Array, orientation: ArrayLike, plane: str = "xy", through: ArrayLike | None = None
 ) -> TaskPath:
-    """Positions (T, 2) or (T, 3), and one unit quaternion w, x, y, z for all samples or for each, as poses.
-
-    Positions of two dimensions lie in a plane through a point (3,), by default the origin.
-    """
+    """Positions (T, 2), in a plane through a point, or (T, 3), and quaternions w, x, y, z, one or (T, 4), as poses."""
     d = positions.shape[1]
     if d not in (2, 3):
         raise TrajectoryError(

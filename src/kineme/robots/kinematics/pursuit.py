@@ -52,10 +52,9 @@ _NEARLY = 1e-4  # the same, if there is none: arms of few joints turn as far as 
 def pursue(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> tuple[Array, descent.TaskPath] | None:
     """Find joint positions (T, n) along a path, and return them with the path at T poses; None if there is no way.
 
-    Postures at the beginning, the end and the middle of the path are followed to both ends, all at once, by Newton's
-    method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
-    is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
-    that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
+    Postures at the beginning are followed to the end, all at once, by Newton's method with limits. What a pose leaves
+    free stays, or goes slowly towards the rest posture and away from stops. Of the ways within 0.01 mm of the path it
+    is that of least cost, smoothed as `relaxed`; if it comes to a stop, also from the end and the middle on.
     """
     path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
     margin = (1 - _INSIDE) * (robot.upper - robot.lower) / 2
@@ -169,10 +168,7 @@ def relaxed(robot: Robot, path: descent.TaskPath, turn_costs: Array, joints: Arr
 
 
 def choose_posture(robot: Robot, path: descent.TaskPath, turn_costs: Array, stands: Array) -> Array:
-    """The posture at the start from which the whole movement costs least, with the way to it.
-
-    0.1 is added for each radian of the joint that has farthest to go from where it `stands` (n,).
-    """
+    """The posture at the start from which the movement costs least, plus 0.1 a radian of the joint farthest from it."""
     starts = descent.reaching_postures(
         robot, path.positions[0], path.rotations[0], turn_costs, descent.pose_in_words(path, 0)
     )
@@ -182,10 +178,7 @@ def choose_posture(robot: Robot, path: descent.TaskPath, turn_costs: Array, stan
 
 
 def choose_place(robot: Robot, path: descent.TaskPath, turn_costs: Array) -> descent.TaskPath:
-    """The path shifted, among 27 places around where the tip rests, to where the whole movement costs least.
-
-    A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
-    """
+    """The path at that of 27 places around the resting tip where it costs least; a meter below the base costs 100."""
     tip = descent.kinematics(robot, robot.rest[None])[0][0]
     center = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2
     shifts = tip - center + np.array(list(product(_OFFSETS, repeat=3))) * np.linalg.norm(tip)

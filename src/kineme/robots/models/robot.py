@@ -243,11 +243,10 @@ def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str,
 
 
 def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Array, bool]:
-    """Return the middle of the limits (n,); if the arm is singular there, as a straight one is, with joints bent.
+    """Return the middle of the limits (n,), and where it is singular, as of a straight arm, with joints bent: True.
 
-    Of the postures with up to three joints turned by 60 degrees, within the limits and with no link lower than in the
-    middle or than the base, that whose Jacobian has the largest smallest singular value. Whether joints are bent is
-    returned second.
+    Of the postures with up to three joints turned by 60 degrees, within the limits and no link lower than in the middle
+    or than the base, that whose Jacobian has the largest smallest singular value.
     """
     wide = upper - lower > 2 * pi + 1e-9
     middle = np.where(wide, np.clip(0.0, lower, upper), (lower + upper) / 2)

@@ -72,10 +72,7 @@ class Chain(NamedTuple):
 
 
 def read_chain(path: Path, tip: str | None) -> Chain:
-    """Read the chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
-
-    Joints of grippers and hands are no part of it.
-    """
+    """Read the chain from the root of a URDF to the frame `tip`, by default the end of the longest chain of the arm."""
     robot = read_root(path)
     links = _names(robot.findall("link"))
     parents: dict[str, ElementTree.Element] = {}  # the joint above each link that has one
@@ -241,10 +238,7 @@ def without_macros(path: Path) -> ElementTree.Element:
 
 
 def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
-    """Write the path of each collision mesh into the tree, and remove missing ones; return links without shape.
-
-    ``package://NAME/...`` is looked for in every folder above the URDF, as ROS packages lie beside one another.
-    """
+    """Write the path of each collision mesh into the tree, and remove missing ones; return links without shape."""
     missing = []
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
@@ -260,7 +254,7 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
 
 
 def find_mesh(name: str, path: Path) -> Path | None:
-    """Find the file of a mesh that the URDF at `path` calls `name`; None where it is not there."""
+    """Find the file of a mesh that a URDF names, in any folder above it, as ROS packages lie; None where it is not."""
     within = next((name.removeprefix(prefix) for prefix in _PREFIXES if name.startswith(prefix)), name)
     folders = path.resolve().parents
     try:
@@ -282,13 +276,12 @@ class Candidate(NamedTuple):
 class Ends:
     """The tree of a URDF as bodies, which are links that fixed joints hold together, and the joints between them.
 
-    `downwards`: the links, each after the one above it; `parents`: the joint above each that has one. `gripper`: names
-    of the joints of grippers and hands: by their names (finger, thumb, jaw, gripper ...), joints that mimic others at
-    the end of a chain, and two or more branches of equally many joints that leave the end of a chain at least twice as
-    long. If nothing else moves, there are none.
+    `gripper`: names of the joints of grippers and hands: by words (finger, jaw ...), those that mimic others at the end
+    of a chain, and branches of equally many joints at the end of a chain twice as long; none if nothing else moves.
     """
 
     def __init__(self, links: Sequence[str], downwards: list[str], parents: dict[str, ElementTree.Element]) -> None:
+        # `downwards`: the links, each after the one above it; `parents`: the joint above each that has one.
         self._links, self._parents = links, parents
         self._bodies: dict[str, str] = {}  # link -> the link that stands for those which fixed joints hold together
         for link in downwards:

@@ -39,18 +39,11 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     joint_units: str | None = None,
     plane: str = "xy",
 ) -> GeneratedMovement:
-    """Generate a movement with start and goal in the frame of a robot.
+    """Generate a movement of the tip, or of the `joints` of an arm, with start and goal in the frame of the robot.
 
-    - `at`, `goal` (3,): start and goal of the tip [m]; of the joints, with as many numbers as they are. By default as
-      demonstrated; a goal is then that from the demonstrated start.
-    - `duration`: [s].
-    - `displacement` (n,): goal minus start, in the unit of the recording, instead of a goal.
-    - `scale`: meters (of the joints radians) for one unit of the recording, as 0.001 for millimeters; by default as the
-      heads of its columns say, and where they do not, 1.
-    - `rate`: samples per second, at least.
-    - `joints`: it is a movement of the joints of this arm; without, one of the tip.
-    - `joint_units` ({"deg", "rad", "percent"}, optional): of columns of joints that say no unit; see `move`.
-    - `plane` ({"xy", "xz", "yz"}): where the axes of a movement of two dimensions lie.
+    `at` and `goal` (3,) or, of the joints, (n,) are in meters and radians, by default as demonstrated; `displacement`
+    (n,) is goal minus start in the unit of the recording. `scale` is meters or radians for one of these units, by
+    default as heads of columns say it, else 1. `joint_units` and `plane` are as of `move`, `rate` is the least [1/s].
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     n = len(roles.positions)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -159,7 +159,9 @@ def _along(
     slower: list[robot_movement.RobotMovement] = []
     errors: list[TrajectoryError] = []
     lost = False
-    for way in ways_along(ik, planned.follow):
+    # What may be left free may also be followed.
+    solvers = [ik, *(descent.InverseKinematics(ik.robot, stricter) for stricter in _STRICTER[planned.follow][1:])]
+    for way in (Way(solver, sought) for sought in (False, True) for solver in solvers):  # the quickest first
         if way.sought and not lost:
             break
         try:
@@ -202,10 +204,7 @@ class Way(NamedTuple):
     sought: bool  # by `pursue`, among many postures: that takes as long as fifty others
 
     def joints(self, path: descent.TaskPath, place: str, stands: Array) -> tuple[CubicSpline, descent.TaskPath]:
-        """Solve the joints over time, and place the path, for an arm that stands at `stands` (n,).
-
-        The posture at the start, and a place that is free, are those with which the whole movement costs least.
-        """
+        """Solve the joints over time, and place the path where it is free, at least cost from where they stand (n,)."""
         robot, costs = self.ik.robot, self.ik.costs
         if place == "free":
             path = choose_place(robot, path, costs)
@@ -225,16 +224,6 @@ class Way(NamedTuple):
             if np.abs(off).max() <= _CLOSE:
                 break
         return joints, dense
-
-
-def ways_along(ik: descent.InverseKinematics, follow: str) -> Iterator[Way]:
-    """Yield the ways to try, the quickest first; what may be left free may also be followed."""
-    solvers: list[descent.InverseKinematics] = []
-    for stricter in _STRICTER[follow]:
-        solvers.append(descent.InverseKinematics(ik.robot, stricter) if solvers else ik)
-        yield Way(solvers[-1], False)
-    for solver in solvers:
-        yield Way(solver, True)
 
 
 class Request(NamedTuple):

@@ -99,10 +99,7 @@ class PlannedPath(NamedTuple):
 
 
 def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> RobotMovement:
-    """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does.
-
-    Where the fastest timing along the path is slower than the movement itself, it is that.
-    """
+    """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does."""
     robot, joints, rate = planned.robot, planned.joints, planned.rate
     itself = partial(as_generated, robot, joints, rate)
     if timing == "generated":
@@ -113,7 +110,7 @@ def with_timing(planned: PlannedPath, timing: str, most: int = LONGEST) -> Robot
     result = _slowed(planned, partial(sampled, robot, parameterization, rate), most, follows=True)
     if result.factor <= 1 or not np.isfinite(result.preflight.slower):
         return result
-    other = _slowed(planned, itself, most)
+    other = _slowed(planned, itself, most)  # the fastest timing along the path is slower than that
     return min((result, other), key=lambda each: (not each.preflight.passed, each.trajectory.duration))
 
 

@@ -52,8 +52,7 @@ class Scales(NamedTuple):
 def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot | None = None) -> Roles:
     """Roles of recorded columns, of which nothing but the number is known if they have no channels.
 
-    Columns with the names of the joints of the arm are these joints, in its order; the others, as of a gripper, go
-    along. As many columns of other names are the joints one after the other, which a warning says.
+    Columns with the names of joints are these, others go along; as many of other names are joints in their order.
     """
     if channels is None:
         posed = space == "tip" and n_columns == 7
@@ -97,10 +96,8 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
 def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None) -> Scales:
     """Meters and radians of recorded positions: of the tip or, of a given arm, of its joints.
 
-    Units are those of the heads. Where these say none, joints have `joint_units`: "deg", "rad", or "percent", which is
-    -100 to 100 between the limits of each joint, as LeRobot's drivers normalize to their calibration. Without it
-    columns that are called as LeRobot's drivers call them are in degrees, which is said by a warning; others are in
-    radians and meters, and so are positions of the tip.
+    Units are those of the heads; where these say none, `joint_units` as of `move`. Without it columns that are called
+    as LeRobot's drivers call them are in degrees, which is said by a warning, and others in radians and meters.
     """
     n = len(roles.positions)
     size, offset = np.ones(n), np.zeros(n)
@@ -187,12 +184,9 @@ def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
 def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     """Find the column of each joint of an arm, by its name; None unless every joint has exactly one.
 
-    Units, what stands before the name of the joint as that of a feature or a topic, the ``.pos`` of LeRobot's drivers,
-    and the side of one arm of two, as ``left_elbow_flex``, are no part of it. Without such names, those columns are
-    the joints in which all words of their names stand, as ``ur5_elbow_joint_position``; or, of as many columns as
-    joints, those that differ from one another by the same words as the joints, as ``elbow`` or ``q1``.
-
-    Columns of velocities, accelerations and efforts are no joints.
+    Units, features and topics, the ``.pos`` of LeRobot's drivers, and the side of one arm of two are no part of it.
+    Without such names, columns with all words of a joint are it, as ``ur5_elbow_joint_position``; or those that differ
+    from one another by the same words as the joints, as ``q1``. Columns of velocities and efforts are none.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
@@ -219,10 +213,7 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 
 
 def check_order(names: Sequence[str], robot: Robot) -> None:
-    """Say that columns, as many as joints and of other names, are taken as these one after the other.
-
-    Velocities are refused, and names or numbers of the columns that say another order.
-    """
+    """Warn that columns of other names are taken as the joints in their order; refuse rates, and names of another."""
     rates = list(filter(_is_rate, names))
     if rates:
         raise TrajectoryError(f"expected positions of the joints, got {', '.join(rates)}; choose other columns")

@@ -83,10 +83,7 @@ def _short(name: str) -> str:
 
 
 def robot_scene(movement: RobotMovement, name: str) -> Scene:
-    """Return the joints over time, the tip as it is executed and as it is wanted, and when the approach is over.
-
-    Joints are in rad or m, the tip in the frame of the robot's base [m]; `name` is that of the movement.
-    """
+    """Return the joints over time, the tip as it is executed and as it is wanted, and when the approach is over."""
     robot, trajectory = movement.robot, movement.trajectory
     joints = tuple(f"{joint} [{unit}]" for joint, unit in zip(robot.joints, robot.units, strict=True))
     rates = tuple(f"{joint} [{unit}/s]" for joint, unit in zip(robot.joints, robot.units, strict=True))

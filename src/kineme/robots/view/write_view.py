@@ -215,8 +215,7 @@ class Shapes(NamedTuple):
 def shapes_of(robot: Robot) -> Shapes:
     """The visual shapes of an arm, by name those that are installed; where a link has none, its collision shapes.
 
-    A link whose meshes are not there, of another format than STL and COLLADA, or larger than 16 MB with those before
-    them, is drawn as cylinders to the joints that it bears; so is every link of a file without any shape.
+    A link whose meshes cannot be in the page, and any of a file without shapes, is cylinders to the joints it bears.
     """
     root = root_with_shapes(robot)
     links = {str(link.get("name")): f"l{i}" for i, link in enumerate(root.findall("link"))}
@@ -376,10 +375,7 @@ class LinkShapes:
 
 
 def root_with_shapes(robot: Robot) -> Element:
-    """The URDF of an arm; of an arm by name, with the shapes of its links in the package instead of ours.
-
-    Its frames of links are those of the models here.
-    """
+    """The URDF of an arm; of one by name, with the shapes of its links in the package, whose frames are as ours."""
     root = read_root(robot.source)
     model = MODELS.get(robot.name) if robot.source.parent == FOLDER else None
     folder = robots_folder() if model is not None and model.meshes else None

@@ -96,10 +96,7 @@ def summary_of(snapshot: Snapshot) -> str:
 
 
 def bundled(entry: Path) -> str:
-    """The module and those that it imports, each in a function of its own, in the order in which they need each other.
-
-    Understood are ``import { a, b } from "./file.js";`` and ``export`` before a function, class or constant.
-    """
+    """The module and those it imports, each in a function; they import and export as `_IMPORT` and `_EXPORT` say."""
     done: dict[Path, str] = {}
     parts = ['"use strict";']
     _add(entry.resolve(), done, parts)

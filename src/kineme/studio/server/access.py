@@ -29,9 +29,8 @@ _FRAMED = "/arm.html"  # the only page that the studio's page shows inside itsel
 class Guard:
     """Check every request and every websocket, and say with every answer what browsers may do with it.
 
-    What opens the page `once` is in the place of the token: other users of the machine see the address that a browser
-    is started with. The hosts are names beside those of the loopback under which the server may be asked, from
-    `--host`; with one, any address.
+    What opens the page `once` hides the token from other users, who see the address that a browser is started with.
+    The hosts are names beside the loopback's under which the server may be asked; with one, any address.
     """
 
     def __init__(

@@ -7,9 +7,7 @@ import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import anyio.to_thread
@@ -44,12 +42,13 @@ _KINDS = {
     ".webmanifest": "application/manifest+json",
     ".txt": "text/plain; charset=utf-8",
 }
+_PACKAGE = Path(__file__).parents[2]
 #: Folders of the package whose files are served, and under which path.
-_FOLDERS = {"": ("studio", "web"), "runtime/": ("studio", "javascript")}
+_FOLDERS = {"": "studio/web", "runtime/": "studio/javascript"}
 #: Files of other rooms: what draws an arm.
 _VENDORED = {
-    "vendor/scene.min.js": ("robots", "view", "vendor", "scene.min.js"),
-    "vendor/viewer.js": ("robots", "view", "page", "viewer.js"),
+    "vendor/scene.min.js": "robots/view/vendor/scene.min.js",
+    "vendor/viewer.js": "robots/view/page/viewer.js",
 }
 
 ABOUT = """An action library: what movements are, what they are called, and how they go on.
@@ -128,9 +127,7 @@ def create_app(
     """The studio of one library, for any ASGI server; the library is made if there is none, unless read only.
 
     Every request must know the token, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie, and
-    ``/?once=...`` sets it one time. The hosts are names beside those of the loopback under which it may be asked; with
-    one, every address too. Read only, it refuses every change. The path `recordings` is a data set or are files whose
-    episodes it shows.
+    ``/?once=...`` sets it one time. The hosts are as of `Guard`; `recordings` are those whose episodes it shows.
     """
     studio = Studio(folder, read_only, None if recordings is None else Path(recordings))
     app = StudioApp(
@@ -170,6 +167,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.studio.close()
 
 
+class _RefusedError(Exception):
+    """Ends the work on a request, unless that catches everything."""
+
+
 class LimitedBodies:
     """Refuse requests that are too large or stop arriving: 413 and 408, whatever their head says."""
 
@@ -181,50 +182,41 @@ class LimitedBodies:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        body = _Body(receive, FILE_BYTES if scope["path"] == FILES else JSON_BYTES, self.silence)
+        most = FILE_BYTES if scope["path"] == FILES else JSON_BYTES
+        received, complete = 0, False
+        refused: tuple[int, str] | None = None
+
+        def check(size: int) -> None:
+            nonlocal refused
+            if size > most:
+                refused = 413, f"expected at most {most // 2**20} MB, got more; send less at once"
+                raise _RefusedError
+
+        async def limited() -> Message:
+            nonlocal received, complete, refused
+            if complete:  # what comes after the body is that the client has gone, whenever it does
+                return await receive()
+            try:
+                async with asyncio.timeout(self.silence):
+                    message = await receive()
+            except TimeoutError:
+                refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
+                raise _RefusedError from None
+            received += len(message.get("body", b""))
+            complete = not message.get("more_body", False)
+            check(received)
+            return message
 
         async def unless_refused(message: Message) -> None:
-            if body.refused is None:
+            if refused is None:
                 await send(message)
 
         announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if not body.is_too_large(int(announced[:20]) if announced.isdigit() else 0):
-            with suppress(_RefusedError):
-                await self.app(scope, body, unless_refused)
-        if body.refused is not None:
-            await refuse(scope, send, *body.refused)
-
-
-class _RefusedError(Exception):
-    """Ends the work on a request, unless that catches everything."""
-
-
-class _Body:
-    def __init__(self, receive: Receive, most: int, silence: float) -> None:
-        self.receive, self.most, self.silence = receive, most, silence
-        self.got, self.complete = 0, False
-        self.refused: tuple[int, str] | None = None
-
-    async def __call__(self) -> Message:
-        if self.complete:  # what comes after the body is that the client has gone, whenever it does
-            return await self.receive()
-        try:
-            async with asyncio.timeout(self.silence):
-                message = await self.receive()
-        except TimeoutError:
-            self.refused = 408, f"expected the rest of the request, got nothing for {self.silence:g} s"
-            raise _RefusedError from None
-        self.got += len(message.get("body", b""))
-        self.complete = not message.get("more_body", False)
-        if self.is_too_large(self.got):
-            raise _RefusedError
-        return message
-
-    def is_too_large(self, size: int) -> bool:
-        """Refuse a body of more bytes than it may have."""
-        if size > self.most:
-            self.refused = 413, f"expected at most {self.most // 2**20} MB, got more; send less at once"
-        return size > self.most
+        with suppress(_RefusedError):
+            check(int(announced[:20]) if announced.isdigit() else 0)
+            await self.app(scope, limited, unless_refused)
+        if refused is not None:
+            await refuse(scope, send, *refused)
 
 
 class StaticFile(NamedTuple):
@@ -257,26 +249,14 @@ class StaticFiles:
 
 def static_files() -> dict[str, StaticFile]:
     """Read all files, by their path; ``/`` is the page."""
-    package = files("kineme")
-    by_path: dict[str, Traversable] = {}
+    by_path = {path: _PACKAGE / where for path, where in _VENDORED.items()}
     for path, folder in _FOLDERS.items():
-        by_path |= _below(package.joinpath(*folder), path)
-    by_path |= {path: package.joinpath(*where) for path, where in _VENDORED.items()}
+        below = (file for file in (_PACKAGE / folder).rglob("*") if file.suffix in _KINDS)
+        by_path |= {path + file.relative_to(_PACKAGE / folder).as_posix(): file for file in below}
     by_path[""] = by_path["index.html"]
-    return {f"/{path}": _read(file) for path, file in by_path.items()}
-
-
-def _below(folder: Traversable, path: str) -> dict[str, Traversable]:
-    by_path: dict[str, Traversable] = {}
-    for entry in folder.iterdir():
-        if entry.is_dir():
-            by_path |= _below(entry, f"{path}{entry.name}/")
-        elif PurePath(entry.name).suffix in _KINDS:
-            by_path[path + entry.name] = entry
-    return by_path
-
-
-def _read(file: Traversable) -> StaticFile:
-    body = file.read_bytes()
-    tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
-    return StaticFile(body, _KINDS[PurePath(file.name).suffix].encode(), tag.encode())
+    answers = {}
+    for path, file in by_path.items():
+        body = file.read_bytes()
+        tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+        answers[f"/{path}"] = StaticFile(body, _KINDS[file.suffix].encode(), tag.encode())
+    return answers

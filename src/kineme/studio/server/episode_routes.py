@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
@@ -14,7 +14,7 @@ from kineme.studio.server.importing import command
 from kineme.studio.server.opened import KEY, Lane, Opened, OpenedRecordings
 from kineme.studio.server.recording_routes import FoundSpan, PlotOut, SpannedOut, UploadOut, plot_of, table_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
-from kineme.studio.server.studio import Reads, Studio, Writes
+from kineme.studio.server.studio import Reads, Writes
 
 EpisodeKey = Annotated[str, Path(description="Key of an episode, as in `/api/episodes`.")]
 CameraName = Annotated[str, Path(description="Camera of the episode, as in `/api/episodes/{key}`.")]
@@ -87,10 +87,13 @@ class SavedOut(BaseModel):
 router = APIRouter(prefix="/api/episodes", tags=["episodes"])
 
 
-def _opened(studio: Studio) -> OpenedRecordings:
+async def _opened(studio: Reads) -> OpenedRecordings:
     if studio.opened is None:
         raise MissingError("expected recordings, the studio was started without; start it with --recordings")
     return studio.opened
+
+
+Recorded = Annotated[OpenedRecordings, Depends(_opened)]
 
 
 @router.get("", response_model=EpisodesOut, summary="Episodes, some at a time")
@@ -123,9 +126,8 @@ async def episodes(
     response_class=Response,
     responses={200: {"content": {"text/csv": {}}}},
 )
-def corrections(studio: Reads) -> Response:
+def corrections(opened: Recorded) -> Response:
     """Annotations of the episodes that a person corrected, as `kineme annotate` writes them."""
-    opened = _opened(studio)
     name = "".join(
         mark if mark.isascii() and (mark.isalnum() or mark in "-_.") else "_" for mark in opened.corrections.path.name
     )
@@ -134,39 +136,33 @@ def corrections(studio: Reads) -> Response:
 
 
 @router.post("/corrections", response_model=SavedOut, summary="Save corrections")
-def save(studio: Writes, body: SaveRequest) -> dict[str, Any]:
+def save(studio: Writes, opened: Recorded, body: SaveRequest) -> dict[str, Any]:
     """Write them beside what was opened; 409 if others have written that file since."""
-    corrections = _opened(studio).corrections
+    corrections = opened.corrections
     return {"file": corrections.save(replace=body.replace).name, "n_spans": len(corrections.corrected)}
 
 
 @router.get("/{key}", response_model=EpisodeDetail, summary="One episode")
-async def episode(studio: Reads, key: EpisodeKey, width: Width = 1000) -> dict[str, Any]:
+async def episode(studio: Reads, opened: Recorded, key: EpisodeKey, width: Width = 1000) -> dict[str, Any]:
     """Its signals, thinned to a width, its channels and videos; `/api/recordings/{key}` searches and learns it."""
-    opened = _opened(studio)
     shown = await studio.reading(_detail, opened, key, width)
     return shown | {"command": command(opened.name, str(studio.library.folder), {})}
 
 
 @router.get("/{key}/strip", response_model=PlotOut, summary="The signals of an episode as a strip")
-async def strip(studio: Reads, key: EpisodeKey, width: Width = 600) -> dict[str, Any]:
+async def strip(studio: Reads, opened: Recorded, key: EpisodeKey, width: Width = 600) -> dict[str, Any]:
     """The feature that is read by default, thinned to a width: every peak is there."""
-    opened = _opened(studio)
     item = await studio.reading(opened.episode, key)
     return await studio.reading(_strip, item, width)
 
 
 @router.post("/{key}/spans", response_model=EpisodeOut, summary="Keep what an episode shows")
-async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[str, Any]:
+async def put_spans(studio: Reads, opened: Recorded, key: EpisodeKey, body: SpansRequest) -> dict[str, Any]:
     """Until the studio ends, or they are saved: what a person corrected is in the table of corrections."""
-    opened = _opened(studio)
     item = await studio.reading(opened.episode, key)
-    annotations = [
-        item.annotation((span.begin, span.end), span.label, span.p, span.confidence)
-        for span in sorted(body.spans, key=lambda span: span.begin)
-        if span.end > span.begin
-    ]
-    unknown = item.annotation((0.0, item.duration), None, None, None)
+    spans = sorted((span for span in body.spans if span.end > span.begin), key=lambda span: span.begin)
+    entire = FoundSpan(begin=0.0, end=item.duration)
+    *annotations, unknown = (span.annotation(*item.movement, item.origin) for span in (*spans, entire))
     opened.corrections.put(item.movement, Lane(tuple(annotations), body.corrected, (unknown,)))
     return _episode(opened, item, int(key.removeprefix(KEY)))
 
@@ -177,9 +173,8 @@ async def put_spans(studio: Reads, key: EpisodeKey, body: SpansRequest) -> dict[
     response_class=FileResponse,
     responses={200: {"content": {"video/mp4": {}, "video/webm": {}}}},
 )
-async def video(studio: Reads, key: EpisodeKey, camera: CameraName) -> FileResponse:
+async def video(studio: Reads, opened: Recorded, key: EpisodeKey, camera: CameraName) -> FileResponse:
     """The file as the data set has it, also in parts (``Range``)."""
-    opened = _opened(studio)
     item = await studio.reading(opened.episode, key)
     path, kind = await studio.reading(opened.video, item, camera)
     return FileResponse(path, media_type=kind, headers={"Cache-Control": "private, max-age=3600"})

@@ -37,11 +37,7 @@ _NO_NAMES = "The columns of this file have no names."
 
 
 def table_preview(path: Path) -> dict[str, Any] | None:
-    """Return the first rows of a table of text and guesses at its columns; None of other files, or without samples.
-
-    The guesses are ``time``, the head of a column or None, ``units`` of the time, ``rate`` in samples a second where
-    there is no time, ``columns`` of coordinates, and ``measured_in``, the unit that the file says of these.
-    """
+    """Return the first rows of a table of text and guesses at how it is read; None of others, or without samples."""
     form = FORMATS.get(path.suffix.lower())
     if form is None or not form.has_lines:
         return None
@@ -92,16 +88,20 @@ def table_preview(path: Path) -> dict[str, Any] | None:
 def array_preview(path: Path) -> dict[str, Any] | None:
     """Return the same of a file of arrays that lacks nothing but the times of its samples; None of any other."""
     with suppress(KinemeError):
-        read = read_recordings(path, units=1 / _RATE).demonstrations
-        channels = read.channels
-        values = read.positions if channels is None else read.recorded
-        heads = axis_names(read.n_dims) if channels is None else tuple(recorded_names(channels))
+        read = read_recordings(path, units=1 / _RATE)
+        heads = columns_of(read)
         return {
-            **{"heads": list(heads), "columns": list(heads), "numbers": [True] * len(heads), "named": None},
-            "rows": [[f"{value:.6g}" for value in row] for row in values[:_ROWS]],
+            **{"heads": heads, "columns": heads, "numbers": [True] * len(heads), "named": None},
+            "rows": [[f"{value:.6g}" for value in row] for row in read.demonstrations.recorded[:_ROWS]],
             **{"time": None, "units": None, "rate": _RATE, "measured_in": None},
         }
     return None
+
+
+def columns_of(read: Recordings) -> list[str]:
+    """Return the names of the columns, as they were recorded."""
+    demos = read.demonstrations
+    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
 
 
 def _values(cells: Sequence[str], comma: bool) -> Array:

@@ -68,17 +68,15 @@ def _annotated(detail: dict[str, Any]) -> str:
     return f"{_name(detail['symbol'])}: {', '.join(parts)}"
 
 
-def _deleted(detail: dict[str, Any]) -> str:
-    if "symbol" in detail:
-        return f"Deleted {_name(detail['symbol'])}; its movements stayed"
-    return f"Deleted {_movements(detail['movements'])}"
-
-
 _SAID: dict[str, Any] = {
     "learn": _learned,
     "rename": lambda detail: f"Renamed {_name(detail['old'])} to {_name(detail['new'])}",
     "annotate": _annotated,
-    "delete": _deleted,
+    "delete": lambda detail: (
+        f"Deleted {_name(detail['symbol'])}; its movements stayed"
+        if "symbol" in detail
+        else f"Deleted {_movements(detail['movements'])}"
+    ),
     "merge": lambda detail: f"Merged {_names(detail['names'])} into {_name(detail['into'])}",
     "split": lambda detail: (
         f"Split {_movements(detail['movements'])} off {_name(detail['symbol'])} as {_name(detail['new'])}"

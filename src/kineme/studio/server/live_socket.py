@@ -62,17 +62,8 @@ async def live(socket: WebSocket) -> None:
         reading.cancel()
 
 
-class _Received(NamedTuple):
-    """A message of a client: samples, a command, its name, a hand, or what was wrong with it; `_END` at the end."""
-
-    samples: Array | None = None
-    command: str | None = None
-    name: str | None = None
-    hand: dict[str, Any] | None = None
-    wrong: str | None = None
-
-
-_END = _Received()
+#: A message of a client by its kind: a key of `_PARSED`, a command, "wrong" with the reason, or "end".
+_Received = tuple[str, Any]
 
 
 class _Client:
@@ -126,15 +117,15 @@ class _Client:
         while True:
             message = await self.socket.receive()
             if message["type"] == "websocket.disconnect":
-                await self._waiting.put(_END)
+                await self._waiting.put(("end", None))
                 return
             await self._waiting.put(_parsed(message))
 
     async def answer_all(self) -> None:
         """Answer to one message after the other, until the client goes."""
-        while (received := await self._next()) is not _END:
+        while (received := await self._next())[0] != "end":
             try:
-                answer = await self._answer(received)
+                answer = await self._answer(*received)
             except KinemeError as error:
                 answer = {"error": str(error)}
             if answer is not None:
@@ -142,48 +133,44 @@ class _Client:
 
     async def _next(self) -> _Received:
         """Wait for the next message; samples that wait behind samples are taken in with them, and answered once."""
-        received, self._held = self._held or await self._waiting.get(), None
-        if received.samples is None:
-            return received
-        blocks = [received.samples]
+        (kind, first), self._held = self._held or await self._waiting.get(), None
+        if kind != "samples":
+            return kind, first
+        blocks = [first]
         while not self._waiting.empty():
             following = self._waiting.get_nowait()
-            if following.samples is None or following.samples.shape[1] != received.samples.shape[1]:
+            if following[0] != "samples" or following[1].shape[1] != first.shape[1]:
                 self._held = following
                 break
-            blocks.append(following.samples)
-        return received if len(blocks) == 1 else _Received(np.concatenate(blocks))
+            blocks.append(following[1])
+        return kind, np.concatenate(blocks)
 
-    async def _answer(self, received: _Received) -> dict[str, Any] | None:
+    async def _answer(self, kind: str, content: Any) -> dict[str, Any] | None:
         run = asyncio.get_running_loop().run_in_executor
-        samples, command, name, hand, wrong = received
-        if self._source is None and self._follower is None and any(part is not None for part in (samples, name, hand)):
+        if self._source is None and self._follower is None and kind in _PARSED:
             self._source = self._sources.add()  # a program, which the pages show
         source = self._source
-        if samples is not None:
-            state = await run(self.studio.live, self.session.update, samples)
+        if kind == "samples":
+            state = await run(self.studio.live, self.session.update, content)
             if source is not None:
-                source.update(samples, state)
+                source.update(content, state)
             return {"state": state}
-        if command == "finish":
-            try:
-                ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
-            except KinemeError as error:
-                ended = {"error": str(error)}
+        if kind == "finish":
+            ended = await run(self.studio.live, self.session.finish)
             if source is not None:
                 source.end(ended)
             return ended
-        if command == "reset":
+        if kind == "reset":
             self.session.reset()
             if source is not None:
                 source.reset()
-        elif command == "watch":  # a page: it shows the movements of programs, and others do not show its own
+        elif kind == "watch":  # a page: it shows the movements of programs, and others do not show its own
             self._watch()
-        elif name is not None and source is not None:
-            source.rename(name)
-        elif hand is not None and source is not None:
-            source.show_hand(hand)
-        return None if wrong is None else {"error": wrong}
+        elif kind == "name" and source is not None:
+            source.rename(content)
+        elif kind == "hand" and source is not None:
+            source.show_hand(content)
+        return {"error": content} if kind == "wrong" else None
 
     def _watch(self) -> None:
         if self._follower is None:
@@ -204,26 +191,25 @@ def _parsed(message: Any) -> _Received:
     try:
         content = json.loads(message.get("text") or "")
     except (ValueError, RecursionError):
-        return _Received(wrong=f"expected JSON: {_WORDS}; got something else")
+        return "wrong", f"expected JSON: {_WORDS}; got something else"
     content = content if isinstance(content, dict) else {}
     try:
         for field, parse in _PARSED.items():
             if field in content:
-                return _Received(**{field: parse(content[field])})
+                return field, parse(content[field])
     except TrajectoryError as error:
-        return _Received(wrong=str(error))
+        return "wrong", str(error)
     for command in ("finish", "reset", "watch"):
         if content.get(command) is True:
-            return _Received(command=command)
-    return _Received(wrong=f"expected {_WORDS}; got something else")
+            return command, None
+    return "wrong", f"expected {_WORDS}; got something else"
 
 
 class LiveSession:
     """The stream of one client; made anew for the next movement if the library has changed.
 
-    Preparing for a changed library takes a while. Until then movements are followed by what knew the library before;
-    what knows it now takes over as soon as it is there. A movement that is under way when the library changes is
-    followed on as it began. The answer to the whole movement is that of the library as it is then, in any case.
+    Until it is prepared, movements are followed by the one before, and those under way to their end. The answer to a
+    whole movement is that of the library as it is then.
     """
 
     def __init__(self, studio: Studio) -> None:
@@ -260,22 +246,24 @@ class LiveSession:
         if self._stream is not None:
             self._state = self._stream.update(samples[:, 0], samples[:, 1:]).to_dict(_SHOWN)
 
-    def finish(self) -> dict[str, Any] | None:
-        """Return the answer to the whole movement; None if nothing recognizes it."""
-        if self._is_old and self._begun:
-            self._renew()
-        stream, begun = self._stream, self._begun
-        self._begun = False
-        if stream is None or not begun:
-            return None
+    def finish(self) -> dict[str, Any]:
+        """Return the "answer" to the whole movement, None if nothing recognizes it; or an "error", of one too short."""
+        begun, self._begun = self._begun, False
         try:
+            if begun and self._is_old:
+                self._renew()
+            if self._stream is None or not begun:
+                return {"answer": None}
             if self._version == self.studio.library.version:
-                return stream.finish().to_dict()
-            return self.studio.library.recognize(stream.movement()).to_dict()  # changed since the movement began
+                return {"answer": self._stream.finish().to_dict()}
+            return {"answer": self.studio.library.recognize(self._stream.movement()).to_dict()}  # changed meanwhile
         except SpecificationError:  # no symbols any more
-            return None
+            return {"answer": None}
+        except KinemeError as error:
+            return {"error": str(error)}
         finally:
-            stream.reset()
+            if begun and self._stream is not None:
+                self._stream.reset()
 
     def _renew(self) -> None:
         """Follow the movement by the library as it is now; wait for that if need be."""

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI
 from pydantic import Field
 from starlette.responses import JSONResponse
 
@@ -105,14 +105,11 @@ class Turns:
 def create_search_app(
     shards: Shards, processes: Processes, library: ActionLibrary, token: str, hosts: tuple[str, ...] = ()
 ) -> FastAPI:
-    """Return the search as an application, for any ASGI server; every request must know the token.
-
-    The processes have been started. The hosts are names beside those of the loopback under which it may be asked.
-    """
+    """Return the search by started processes as an application, for any ASGI server; token and hosts as of `Guard`."""
     app = FastAPI(title=COMMAND, openapi_url="/openapi.json", docs_url=None, redoc_url=None)
     answer_errors(app)
     for kind, status in ((UnavailableError, 503), (DataError, 500)):
-        app.add_exception_handler(kind, _refusal(status))
+        app.add_exception_handler(kind, lambda _, error, status=status: JSONResponse({"error": str(error)}, status))
     turns = Turns(processes.candidates)
 
     @app.get("/health")
@@ -141,33 +138,19 @@ def create_search_app(
     return app
 
 
-def _refusal(status: int) -> Any:
-    async def refuse(_: Request, error: Exception) -> JSONResponse:
-        return JSONResponse({"error": str(error)}, status)
-
-    return refuse
-
-
 class SearchOptions(NamedTuple):
-    """Options of the server; processes None is one for each processor, at most.
-
-    `progress` is called with the number of movements that are ready to be searched, and of all.
-    """
+    """Options of the server."""
 
     library: Path
     shards: Path
     host: str = LOOPBACK
     port: int = 8765
-    processes: int | None = None
-    progress: Callable[[int, int], object] | None = None
+    processes: int | None = None  # one for each processor, at most
+    progress: Callable[[int, int], object] | None = None  # takes the movements that can be searched, and all
 
 
 def serve_search(options: SearchOptions, ready: Callable[[str, str, int], object]) -> None:
-    """Serve the shards until interrupted; `ready` is called with the address, the token and the count.
-
-    Raises `SpecificationError`: an address of a network without a token in the environment, or shards of another
-    library; `DataError`: shards that are damaged.
-    """
+    """Serve the shards until interrupted; `ready` is called with the address, the token and the count."""
     token = token_of_server()
     if not is_loopback(options.host) and TOKEN not in os.environ:
         raise SpecificationError(

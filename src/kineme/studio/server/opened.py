@@ -21,10 +21,9 @@ from kineme.io.reading.recordings import read_recordings
 from kineme.io.records import needs
 from kineme.io.writing.annotations import Annotation, to_csv
 from kineme.library.correct import corrections_beside
-from kineme.movements.channels.channel import recorded_names
 from kineme.movements.episodes import Episode, place_of
-from kineme.movements.trajectories.movements import axis_names
 from kineme.reporting.atomic import write_atomically
+from kineme.studio.server.importing import columns_of
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.validation import Array
 
@@ -159,14 +158,6 @@ class Opened(NamedTuple):
         """Names of the columns of each feature; the one that is read by default comes first."""
         return heads_of(self.episode)
 
-    def annotation(
-        self, span: tuple[float, float], symbol: str | None, p_value: float | None, confidence: float | None
-    ) -> Annotation:
-        """Return what a stretch shows, in seconds since the first sample; without a p-value, a person said it."""
-        start, end = (self.origin + time for time in span)
-        certainty = float("nan") if p_value is None else p_value, 1.0 if confidence is None else confidence
-        return Annotation(self.recording, self.place, start, end, symbol, *certainty, self.origin)
-
     @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
@@ -281,10 +272,7 @@ class OpenedRecordings:
         return {"start": 0.0 if video is None else video.start, "codec": self._info.cameras.get(camera)}
 
     def video(self, opened: Opened, camera: str) -> tuple[Path, str]:
-        """Return the file of a camera's video and its kind, by its first bytes; a MissingError if there is none.
-
-        A path that leads out of the data set is none, and so is a link to anything else than a video.
-        """
+        """Return the file of a camera's video in the data set and its kind by its first bytes, or a MissingError."""
         name = opened.episode.videos.get(camera)
         if name is None or Path(name).is_absolute() or ".." in Path(name).parts:
             cameras = list(opened.episode.videos)
@@ -301,10 +289,7 @@ class OpenedRecordings:
         raise MissingError(f"expected a video (MP4, WebM) in {path.name}, got something else")
 
     def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
-        """Read one episode as a recording, in these columns or in all that are found.
-
-        Where these are no movement together, it is read in those of the feature that is read by default.
-        """
+        """Read one episode as a recording, in these columns or in all, or, if these are none, those read by default."""
         opened = self.episode(key)
         if opened.file is None:
             try:
@@ -326,12 +311,6 @@ def movement_of(read: Recordings, k: int) -> Recordings:
     return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
 
 
-def columns_of(read: Recordings) -> list[str]:
-    """Return the names of the columns, as they were recorded."""
-    demos = read.demonstrations
-    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
-
-
 def opened_at(path: Path) -> Iterator[Opened]:
     """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
     if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
@@ -348,19 +327,14 @@ def opened_at(path: Path) -> Iterator[Opened]:
             yield Opened(lost, entry.name, "", entry.path)
             number += 1
             continue
-        demos = read.demonstrations
-        names = columns_of(read)
-        values, stamps = demos.positions if demos.channels is None else demos.recorded, demos.movements.stamps
+        demos, names = read.demonstrations, {"": tuple(columns_of(read))}
         for k, source in enumerate(read.sources):
             rows = slice(demos.offsets[k], demos.offsets[k + 1])
             where = " ".join(filter(None, (entry.name, source.place)))
             label = source.label or entry.relative.parent.name or None
-            yield Opened(
-                Episode(number, stamps[rows].copy(), {"": values[rows].copy()}, {"": tuple(names)}, label, place=where),
-                entry.name,
-                source.place,
-                entry.path,
-            )
+            values = {"": demos.recorded[rows].copy()}
+            episode = Episode(number, demos.times[rows].copy(), values, names, label, place=where)
+            yield Opened(episode, entry.name, source.place, entry.path)
             number += 1
 
 

@@ -40,7 +40,7 @@ def save(recordings: Recordings, path: Path) -> None:
     }
     arrays = {
         "header": np.frombuffer(json.dumps(header).encode(), np.uint8),
-        "recorded": demos.positions if demos.channels is None else demos.recorded,
+        "recorded": demos.recorded,
         **{name: getattr(movements, name) for name in _ARRAYS},
     }
     with path.open("wb") as file:
@@ -66,10 +66,7 @@ def load(path: Path) -> Recordings:
 
 
 def _limit(beyond: int, seconds: int) -> None:
-    """Allow so many bytes beyond what the process has, and so much work: nobody ends it once the studio was killed.
-
-    Where the system knows no such limits, there are none.
-    """
+    """Allow so many bytes and seconds more, where the system can: nobody ends it once the studio was killed."""
     status = Path("/proc/self/status")
     if not status.exists():
         return

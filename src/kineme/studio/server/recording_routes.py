@@ -18,17 +18,17 @@ from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import LabelRow, LabelTable, labeled_pieces
 from kineme.io.writing.annotations import WRITERS, Annotation, write_annotations
 from kineme.io.writing.rerun import points_in, recording_scenes, write_rerun
-from kineme.library.annotate import annotate
+from kineme.library.annotate import annotate_by
 from kineme.library.learn import learn_recordings
+from kineme.library.recognize import some_of_each_symbol
 from kineme.recognition.answer import certainty
 from kineme.sampling import evenly_spaced
 from kineme.studio.server import records
-from kineme.studio.server.importing import command, reader_options, unclear
-from kineme.studio.server.opened import columns_of, movement_of
+from kineme.studio.server.importing import columns_of, command, reader_options, unclear
+from kineme.studio.server.opened import movement_of
 from kineme.studio.server.refusals import MissingError, in_studio_words
 from kineme.studio.server.rollout_routes import as_file
 from kineme.studio.server.studio import Reads, Studio, Work, Writes, while_wanted
-from kineme.studio.server.uploads import go_on
 
 
 class ChannelChoice(records.Change):
@@ -125,6 +125,11 @@ class FoundSpan(Span):
     p: records.Number | None = None
     confidence: records.Number | None = None
     certainty: records.Text | None = None
+
+    def annotation(self, recording: str, place: str, origin: float) -> Annotation:
+        """Return it by the clock of a recording that begins at `origin` [s]; without a p-value, a person said it."""
+        certainty = math.nan if self.p is None else self.p, 1.0 if self.confidence is None else self.confidence
+        return Annotation(recording, place, origin + self.begin, origin + self.end, self.label, *certainty, origin)
 
 
 class AnnotationsRequest(ChannelChoice):
@@ -233,8 +238,8 @@ def shapes(studio: Reads, key: records.RecordingKey, body: ShapesRequest) -> lis
     rows = slice(*read.demonstrations.offsets[(k := _number(read, body.table)) : k + 2])
     demos, names = read.demonstrations, columns_of(read)
     chosen = [name for name in _columns_of(read, body.channels or names) if name in names]
-    values = (demos.positions if demos.channels is None else demos.recorded)[rows][:, [*map(names.index, chosen)]]
-    times = demos.movements.stamps[rows] - demos.movements.stamps[rows.start]
+    values = demos.recorded[rows][:, [*map(names.index, chosen)]]
+    times = demos.times[rows] - demos.times[rows.start]
     points = next(iter(points_in(chosen, values).values()), values[:, :3])
     ends = np.array([(span.begin, span.end) for span in body.spans]).reshape(-1, 2)
     drawn = []
@@ -259,13 +264,8 @@ def export(studio: Reads, key: records.RecordingKey, body: AnnotationsRequest) -
         raise SpecificationError(f"expected one of the formats {', '.join(_ENDINGS)}, got {body.format!r}")
     recording = _one(studio, key, body)
     source, origin = recording.sources[0], float(recording.demonstrations.movements.stamps[0])
-    notes = [
-        Annotation(
-            *(source.path, source.place, origin + span.begin, origin + span.end, span.label),
-            *(math.nan if span.p is None else span.p, 1.0 if span.confidence is None else span.confidence, origin),
-        )
-        for span in sorted(body.spans, key=lambda span: span.begin)
-    ]
+    spans = sorted(body.spans, key=lambda span: span.begin)
+    notes = [span.annotation(source.path, source.place, origin) for span in spans]
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"labels{(ending := _ENDINGS[body.format])}"
         if body.format == "rerun":
@@ -287,7 +287,8 @@ async def spotted(studio: Reads, request: Request, key: records.RecordingKey, bo
         work.check()  # it may have waited for others
         recording = _one(studio, key, body, work.check)
         duration = float(recording.demonstrations.durations[0])
-        report = annotate(studio.library.store, recording, body.error_rate, lambda done: work.tell(done / duration))
+        classes = some_of_each_symbol(studio.library.store)
+        report = annotate_by(classes, recording, body.error_rate, lambda done: work.tell(done / duration))
         if report.problems:
             raise SpecificationError(report.problems[0].what)
         spans = [
@@ -331,14 +332,14 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
-def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
+def _read(studio: Studio, key: str, columns: Sequence[str] = (), check: Callable[[], object] = bool) -> Recordings:
     """Read a file that was sent, or an episode of what was opened, in these columns or in those that are found."""
     if studio.opened is not None and key in studio.opened:
         return studio.opened.recordings(key, columns)
     return studio.uploads.recordings(key, columns, check)
 
 
-def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = bool) -> Recordings:
     """Read all tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = _read(studio, key, check=check)
     ours = [column for channel in studio.library.channels or () for column in channel.columns]
@@ -348,7 +349,7 @@ def _in_columns(studio: Studio, key: str, body: ChannelChoice, check: Callable[[
     return read
 
 
-def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = go_on) -> Recordings:
+def _one(studio: Studio, key: str, body: ChannelChoice, check: Callable[[], object] = bool) -> Recordings:
     """Read one table of a file, in the same columns."""
     read = _in_columns(studio, key, body, check)
     return movement_of(read, _number(read, body.table))
@@ -393,5 +394,4 @@ def plot_of(read: Recordings, k: int, width: int = _PLOTTED // 2) -> dict[str, A
     """Return its columns over seconds since the first sample, at most 2 `width` samples of each."""
     demos = read.demonstrations
     rows = slice(demos.offsets[k], demos.offsets[k + 1])
-    values = (demos.positions if demos.channels is None else demos.recorded)[rows]
-    return records.plot(demos.movements.stamps[rows], values, columns_of(read), width)
+    return records.plot(demos.times[rows], demos.recorded[rows], columns_of(read), width)

@@ -38,10 +38,7 @@ class Options(NamedTuple):
 
 
 def serve(options: Options, ready: Callable[[str, str], object]) -> None:
-    """Serve a library until interrupted; once it can be opened, `ready` is called with its address.
-
-    The second argument of `ready` is an address for the browser of this machine, without the token: it opens once.
-    """
+    """Serve a library until interrupted; `ready` is called with its address, and one without token that opens once."""
     try:
         import uvicorn  # noqa: F401
         import websockets  # noqa: F401
@@ -75,10 +72,9 @@ def run(
     join: Callable[[], object],
     end: Callable[[], object],
 ) -> None:
-    """Serve an application at a socket that listens, until interrupted.
+    """Serve an application at a socket until interrupted; `ready` is called once it can be asked.
 
-    `ready` is called once it can be asked, `join` when it has stopped. What does not stop within two seconds is ended
-    with the process, after `end` was called.
+    Then `join` is called; what does not stop within two seconds is ended with the process, after `end` was called.
     """
     import uvicorn
 

@@ -38,10 +38,6 @@ _MOST_FILES = 8  # files
 _LONGEST = 200  # bytes of a name
 
 
-def go_on() -> None:
-    """Do nothing: the client still waits."""
-
-
 class Uploads:
     """The last few files that were sent; forgotten when the studio ends."""
 
@@ -81,15 +77,11 @@ class Uploads:
             for old in list(self._files)[:-_MOST_FILES]:
                 shutil.rmtree(self._files.pop(old).parent, ignore_errors=True)
                 self.options.pop(old, None), self.previews.pop(old, None)
-                for which in [which for which in self._read if which[0] == old]:
-                    self._read.pop(which)
+                self._read = {which: read for which, read in self._read.items() if which[0] != old}
         return key
 
-    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
-        """Read a file that was sent, in these columns or in those that are found.
-
-        `check` is called again and again, and raises where nobody waits any more.
-        """
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = bool) -> Recordings:
+        """Read a file that was sent, in these columns or those found; `check` raises where nobody waits any more."""
         path, chosen, options = self.path(key), tuple(columns), self.options.get(key, {})
         read = self._read.get((key, chosen))
         if read is None:
@@ -112,14 +104,13 @@ class Uploads:
             )
         return path
 
-    def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = go_on) -> Recordings:
+    def read_as(self, key: str, options: dict[str, Any], check: Callable[[], object] = bool) -> Recordings:
         """Read a file with options of the reader from now on; where they are refused, it is read as before."""
         read = self._read_apart(self.path(key), options, check)
         with self._turn:
             if key in self._files:
                 self.options[key] = options
-                for old in [which for which in self._read if which[0] == key]:
-                    self._read.pop(old)
+                self._read = {which: other for which, other in self._read.items() if which[0] != key}
                 self._read[key, ()] = read
         return read
 

@@ -1,9 +1,8 @@
 """A phone as a wand: a second server on the local network, with one page and what that page sends.
 
-It listens only after a person has asked for it, at one address of a local network, encrypted, under a token of its own,
-and ends when the person ends it or when nothing has moved for a while. Nothing of the studio can be asked there, and
-nothing of the library is told but the name of what was drawn. The page sends requests instead of using a websocket:
-browsers of iPhones accept a self-signed certificate for requests alone (WebKit bug 145819).
+It listens once a person has asked for it, at one local address, encrypted, under a token of its own, until that person
+ends it or nothing moves for a while; all it tells is the name of what was drawn. The page sends requests, as browsers
+of iPhones accept a self-signed certificate for these alone (WebKit bug 145819).
 """
 
 from __future__ import annotations
@@ -229,10 +228,7 @@ class Phone:
                 said = await run(self._live, self._session.update, samples)
                 self.source.update(samples, said)
             if content.get("finish") is True:
-                try:
-                    ended: dict[str, Any] = {"answer": await run(self._live, self._session.finish)}
-                except KinemeError as error:  # too little of a movement
-                    ended = {"error": str(error)}
+                ended = await run(self._live, self._session.finish)
                 self.source.end(ended)
                 said = ended.get("answer") or {}
             return {name: said.get(name) for name in ("label", "certainty")}
@@ -284,10 +280,7 @@ def listening_at(host: Address) -> socket.socket:
 
 
 def certificate_of(host: Address) -> tuple[ssl.SSLContext, str]:
-    """Make a certificate for an address, signed by itself, and return it for a server, with its fingerprint (SHA-256).
-
-    The key is made anew each time, and lies in a folder that only this user can read, until the server has it.
-    """
+    """Make a certificate for an address, signed by itself, with a new key; return it for a server, and its SHA-256."""
     with needs("cryptography", "encrypt what a phone sends", "studio"):
         from cryptography import x509
         from cryptography.hazmat.primitives import hashes, serialization
@@ -310,7 +303,7 @@ def certificate_of(host: Address) -> tuple[ssl.SSLContext, str]:
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     encoding, form = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
     private = key.private_bytes(encoding, form, serialization.NoEncryption())
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:  # that only this user can read
         path = Path(folder, "wand.pem")
         path.write_bytes(private + certificate.public_bytes(encoding))
         context.load_cert_chain(path)
