@@ -21,7 +21,6 @@ from kineme.kernels.rotation import (
     soft_products,
     soft_products_in_plane,
     soft_rotations,
-    turned,
 )
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles, single_threaded_blas
@@ -237,7 +236,7 @@ class Procrustes:
 
         def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
             norms = (a[:, None] * b).ravel()
-            M = turned(_covariances(products), norms, F)
+            M = np.asarray(_covariances(products) + norms[:, None, None] * F)
             best[:] = (soft_products(M) - norms * np.trace(F)).reshape(best.shape)
             if rotations:
                 R[:] = soft_rotations(M).reshape(R.shape)

@@ -342,11 +342,6 @@ def _largest_root(square: Array, determinant: Array, last: Array) -> Array:
     return np.asarray(x)
 
 
-def turned(C: NDArray[np.floating], weight: Array, F: Array) -> Array:
-    """``C + |a| |b| F`` for covariances C (n, 3, 3)."""
-    return np.asarray(C + weight[:, None, None] * F)
-
-
 def blocks(R: Array, n_points: int) -> Array:
     """Return matrices (m, J d, J d) with matrices (m, d, d) J times along the diagonal."""
     if n_points == 1:

@@ -117,21 +117,15 @@ def rollout(
         for name, option in options.items()
     }
     n = via_points.broadcast_length(len(primitives), given)
-
-    def fill(name: str, default: Array) -> Array:
-        option = given[name]
-        value = default if option is None else option
-        return np.broadcast_to(value, (n, *value.shape[1:]))
-
     check_number("n_periods", n_periods, above=0.0)
-    periods = fill("period", primitives.row("periods"))
+    periods = via_points.filled(given["period"], primitives.row("periods"), n)
     via_points.check_durations("period", periods)
     return RhythmicRollout(
         primitives,
-        fill("amplitude", primitives.row("amplitudes")) / primitives.row("amplitudes"),
-        fill("baseline", primitives.row("baselines")),
+        via_points.filled(given["amplitude"], primitives.row("amplitudes"), n) / primitives.row("amplitudes"),
+        via_points.filled(given["baseline"], primitives.row("baselines"), n),
         periods,
-        fill("phase", np.zeros(1)),
+        via_points.filled(given["phase"], np.zeros(1), n),
         given["start"],
         given["velocity"],
         float(n_periods),
@@ -164,11 +158,7 @@ def modulated(movement: RhythmicRollout, via: via_points.ViaLike | via_points.Vi
     if via is None:
         return movement
     dmp = movement.primitives.dmp
-    targets = (
-        via
-        if isinstance(via, via_points.ViaPoints)
-        else via_points.via_points(via, movement.baselines.shape[1], span=PHASES)
-    )
+    targets = via_points.via_points(via, movement.baselines.shape[1], span=PHASES)
     n = via_points.broadcast_length(len(movement), {"via": targets.points}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
     if not movement.ratio.all():

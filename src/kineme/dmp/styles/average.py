@@ -26,7 +26,6 @@ from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
 from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.channel import check_alike
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
@@ -253,13 +252,7 @@ class AveragePrimitive:
 
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
-        primitives = movements if isinstance(movements, Primitives) else own.dmp.learn(movements)
-        if primitives.dmp != own.dmp:
-            raise SpecificationError(f"expected primitives of the same specification, {own.dmp}, got {primitives.dmp}")
-        if primitives.n_dims != own.n_dims:
-            raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
-        check_alike([own.moving_channels, primitives.moving_channels], "movement")
-        return primitives
+        return parameters.of_kind(movements, own.dmp, own.n_dims, own.moving_channels, "the same")
 
 
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:
