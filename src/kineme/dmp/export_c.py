@@ -363,10 +363,7 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
 
 
 def c_name(name: str) -> str:
-    """Return what the identifiers of a header begin with: letters, digits and single underscores, a letter first.
-
-    A suffix always follows, so a word that C reserves may begin an identifier.
-    """
+    """Return what the identifiers of a header begin with, before suffixes: letters, digits, single underscores."""
     words = re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")[:_LONGEST_NAME].strip("_")
     return words if words[:1].isalpha() else f"movement_{words}".strip("_")
 

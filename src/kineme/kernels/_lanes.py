@@ -1,4 +1,4 @@
-"""Vectors of 16 numbers for compiled functions, one number for each of 16 pairs. Importing this imports Numba.
+"""Vectors of 16 numbers for compiled functions, one number for each of 16 pairs.
 
 A compiled function that works on such a vector as if it were one number processes 16 pairs at once. The processor's
 vectors may be shorter: LLVM then uses several of them. Every pair goes through the same operations, so its result

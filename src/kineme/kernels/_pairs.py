@@ -1,4 +1,4 @@
-"""Compiled distances of pairs, twins of those in ``pair_distances.py``: 16 at once. Importing this imports Numba.
+"""Compiled distances of pairs, twins of those in ``pair_distances.py``: 16 at once.
 
 A block holds 16 movements, one in each lane. Its rows are the numbers of a movement's shape, one array after the other,
 as `begins_of` says, each times the root of its weight. The tuple `dims` is as long as a movement has dimensions: its
@@ -94,10 +94,7 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 @_jit
 def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # type: ignore[no-untyped-def]
-    """``squares[:2, i, j]``, the bounds of `elastic_bounds`, and ``squares[2, i, j]``, of clouds, where there is room.
-
-    For 16 movements of A at once.
-    """
+    """``squares[:2, i, j]`` as `elastic_bounds`, and ``squares[2, i, j]`` of clouds, if there is room; 16 of A at once."""
     (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
@@ -275,10 +272,7 @@ def new_work(dims, sizes):  # type: ignore[no-untyped-def]
 
 @_jit
 def begins_of(dims, sizes):  # type: ignore[no-untyped-def]
-    """First rows of tangents, midpoints, turning angles; points, their tangents, turning angles, half squared lengths.
-
-    The length is that of the weighted tangent of a point.
-    """
+    """First rows of tangents, midpoints, turning angles; points, weighted tangents, turning angles, half squares."""
     n_segments, _, n_points = sizes
     t, points = n_segments * len(dims), n_segments * (2 * len(dims) + 1)
     x = n_points * len(dims)

@@ -1,8 +1,4 @@
-"""Compiled best rotations in space under a prior: twins of those in ``rotation.py``, several pairs at once.
-
-Each pair has its own vector lane and goes through the same steps whatever its company: a lane that has converged keeps
-its number while others go on.
-"""
+"""Compiled best rotations in space under a prior: twins of those in ``rotation.py``; for lanes see `_rotation`."""
 
 from __future__ import annotations
 

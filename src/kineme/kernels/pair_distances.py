@@ -62,16 +62,12 @@ _NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding e
 
 @dataclass(frozen=True)
 class ElasticSpec:
-    """Options of comparing segments by dynamic time warping; see the module.
-
-    `position_weight`, `turning_weight`: weights of the squared differences of midpoints and of turning angles / pi;
-    that of tangents is 1.
-    """
+    """Options of comparing segments by dynamic time warping; see the module."""
 
     n_segments: int = 33  # segments of a path, at least 3
     band: int = 6  # a segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978)
-    position_weight: float = 0.5
-    turning_weight: float = 8.0
+    position_weight: float = 0.5  # of squared differences of midpoints; that of tangents is 1
+    turning_weight: float = 8.0  # of turning angles / pi
 
     def __post_init__(self) -> None:
         for name, least in (("n_segments", 3), ("band", 0), ("position_weight", 0), ("turning_weight", 0)):
@@ -80,15 +76,11 @@ class ElasticSpec:
 
 @dataclass(frozen=True)
 class CloudSpec:
-    """Options of comparing points as a cloud; see the module.
-
-    `turning_weight`, `line_weight`: weights of the squared difference of turning angles / pi and of the squared sine
-    between the tangents' lines; that of positions is 1.
-    """
+    """Options of comparing points as a cloud; see the module."""
 
     n_points: int = 20  # points of a path, 3 to 32
-    turning_weight: float = 16.0
-    line_weight: float = 0.75
+    turning_weight: float = 16.0  # of squared differences of turning angles / pi; that of positions is 1
+    line_weight: float = 0.75  # of the squared sine between the tangents' lines
 
     def __post_init__(self) -> None:
         _at_least("n_points", self.n_points, 3)
@@ -339,10 +331,7 @@ def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None, *, 
 def listed_distances(
     A: Shapes, B: Shapes, first: NDArray[np.intp], second: NDArray[np.intp], rotations: NDArray[Any] | None = None
 ) -> Floats:
-    """Of k pairs, A's movement ``first[i]`` and B's ``second[i]``, what `pair_distances` gives: (3, k).
-
-    Rotations are (k, d, d) or, in the plane, (k, 2).
-    """
+    """Distances (3, k) as `pair_distances` of k pairs, A's ``first[i]`` and B's ``second[i]``, rotations (k, ...)."""
     _check(A, B)
     k = len(first)
     entries = np.empty((k, 1, 0), np.float32)
@@ -414,10 +403,7 @@ def _check_rotations(rotations: NDArray[Any], shape: tuple[int, ...], d: int) ->
 
 
 def _fill_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
-    """Write the squared distances (3, n, m) of a tile of pairs, with entries (n, m, r) of their rotations.
-
-    r is d^2, or 2 for cosine and sine, or 0 for no rotation.
-    """
+    """Write the squared distances (3, n, m) of a tile of pairs, with entries (n, m, r) of rotations; r 0 for none."""
     n, m = squares.shape[1:]
     module, numbers = compiled_module("kineme.kernels._pairs"), _numbers(A.elastic, A.cloud)
     a, b = _arrays(A, tile[0]), _arrays(B, tile[1])

@@ -120,10 +120,7 @@ class Procrustes:
         return np.asarray(mixture.reshape(n, -1, samples) / np.where(sizes > 0, sizes, 1.0)[:, None, None])
 
     def prepare(self, rows: Array) -> Prepared:
-        """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once.
-
-        The products run in the rows' own precision, float64 or float32; the norms are float64.
-        """
+        """Rows (n, d * S) as comparisons need them, in their own precision; so stored movements are converted once."""
         rows = self.by_coordinates(rows)
         in_plane = self.n_dims == 2 and self.max_angle > 0
         return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
@@ -149,11 +146,9 @@ class Procrustes:
         return _in_space(A, B, filler(len(A.rows) * len(B.rows)))[0]
 
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
-        """The same, and the rotations that bring B closest to A.
+        """The same, and rotations of B onto A: (n, m, 2), cosine and sine, in the plane, (n, m, 3, 3) in space.
 
         Under a limit in space, these are the best free rotations, turned back to the limit.
-
-        Returns `alignment` (n, m); `rotations` (n, m, 2) with cosine and sine in the plane, (n, m, 3, 3) in space.
         """
         if self.max_angle == 0 or self.n_dims not in (2, 3):
             return self.alignment(A, B), None

@@ -79,10 +79,7 @@ class _Form(NamedTuple):
 
 
 def best_products(C: Array, max_angle: float) -> Array:
-    """Largest ``tr(R^T C)`` (n,) over rotations by at most `max_angle`, for covariances C (n, 3, 3).
-
-    NaN where a covariance is not finite.
-    """
+    """Largest ``tr(R^T C)`` (n,) over rotations by at most `max_angle`, for C (n, 3, 3); NaN where C is not finite."""
     form = _form(C)
     c, s = half_angle(max_angle)
     step, inside = _solve(form, form.trace, c, s)

@@ -286,11 +286,7 @@ def tile_sums_of(term: Term, n_terms: int) -> TileSums:
 
 
 def _median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
-    """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
-
-    Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
-    left out: copies of a row say nothing about the distances between different rows.
-    """
+    """Median over pairs of different rows, of at most 1000 evenly spaced ones, of finish(sum of `term`)."""
     rows = _some_rows(X, _MAX_ROWS)
     sums = np.empty((len(rows), len(rows)))
     fill_gram(term, 0.0, finish, rows, None, sums)

@@ -141,12 +141,10 @@ def fold(
 ) -> tuple[operators.Complex, Array, NDArray[np.intp], Array]:
     """Average over periods by the least-squares Fourier series, then set the phase.
 
-    For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
-    still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
-
-    Of rows (n, d, R) with `cycles` (n,) periods and `lengths` (n,) recorded samples it finds coefficients of `most`
-    harmonics (n, d, H + 1), none above the sampling of a period; where recordings started, in [0, 2 pi); the dimension
-    that set this phase; and the share of the variance that is explained.
+    A fractional number of periods still uses every sample, and its mean is that of whole periods. Of rows (n, d, R),
+    `cycles` (n,) periods and `lengths` (n,) recorded samples it finds coefficients of `most` harmonics (n, d, H + 1),
+    none above the sampling of a period; where recordings started, in [0, 2 pi); the dimension that set this phase; and
+    the share of the variance that is explained.
     """
     n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)

@@ -184,10 +184,7 @@ def _may_be_percent(values: Array) -> bool:
 
 
 def find_numbered_joints(heads: Sequence[str], free: Sequence[int], columns: Array) -> set[int]:
-    """Those of the columns `free` whose numbers say that they are joints.
-
-    One alone, as q1, could be anything. Several that count from 0 or 1, each within a turn, are joints.
-    """
+    """Those of the columns `free` that are joints: several, as q1, q2, that count from 0 or 1, each within a turn."""
     groups: dict[tuple[str, ...], dict[int, int]] = {}
     for k in free:
         *stem, number = words_of(_UNIT.sub("", heads[k])) or ("",)

@@ -1,8 +1,6 @@
 """Smooth movements with the cubic smoothing spline, and interpolate them on an even grid by cubic splines.
 
-The interpolating spline is the not-a-knot cubic spline of `scipy.interpolate.CubicSpline`: fourth order, exact for
-cubics, and twice continuously differentiable, as the second derivative in the fit requires. It is taken movement by
-movement or as one matrix.
+The interpolating spline is not-a-knot: twice continuously differentiable, as the second derivative in the fit requires.
 """
 
 from __future__ import annotations
@@ -113,12 +111,9 @@ def _tile(demonstrations: Demonstrations, start: int, stop: int, cutoff: float) 
 def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], scales: Array) -> tuple[Array, Array]:
     """Smoothed positions minus the first recorded one, and second derivatives, of all movements.
 
-    In the time ``v = scale t`` in which the penalty is 1: with Q the second divided differences and R the Gram matrix
-    of hat functions, both banded, the second derivatives m of the spline solve ``(R + Q'Q) m = Q'x``, and the smoothed
-    positions are ``x - Q m``.
-
-    Of samples (total,) and (total, d) of all movements, at least three each; `scales` (n,) are ``penalty ** (-1/3)``,
-    with the penalty in the unit of the times. Source: Reinsch, see `Smooth`.
+    In the time ``v = scale t`` in which the penalty is 1, `scales` (n,) being ``penalty ** (-1/3)``: with Q the second
+    divided differences and R the Gram matrix of hat functions, both banded, the second derivatives m of the spline
+    solve ``(R + Q'Q) m = Q'x``, and the smoothed positions are ``x - Q m``. Source: Reinsch, see `Smooth`.
     """
     from scipy.linalg import solve_banded
 
