@@ -94,7 +94,7 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 @_jit
 def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # type: ignore[no-untyped-def]
-    """``squares[:2, i, j]`` as `elastic_bounds`, and ``squares[2, i, j]`` of clouds, if there is room; 16 of A at once."""
+    """``squares[:2, i, j]`` as `elastic_bounds`, ``squares[2, i, j]`` of clouds if there is room; 16 of A at once."""
     (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)

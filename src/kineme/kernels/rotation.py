@@ -229,13 +229,7 @@ class RotationPrior:
             object.__setattr__(self, "vertical", _direction(self.vertical))
 
     def matrix(self, n_dims: int) -> Array:
-        """F, (n_dims, n_dims).
-
-        Raises
-        ------
-        SpecificationError
-            A vertical for movements that are not in space.
-        """
+        """F, (n_dims, n_dims). Raises `SpecificationError`: a vertical for movements that are not in space."""
         free = n_dims if self.vertical is None else 2  # about a vertical, movements are rotated as in the plane
         k = CONCENTRATION.get(free, 0.0) if self.concentration is None else self.concentration
         F = k * np.eye(n_dims)

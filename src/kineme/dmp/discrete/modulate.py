@@ -32,14 +32,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from kineme.dmp.batch import Batch
-from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one
 from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_at, smoothness_factor
-from kineme.dmp.discrete.rollout import Change, Rollout, rollout
+from kineme.dmp.discrete.rollout import Change, Rollout
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import SHARES, Span, ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.errors import ExtrapolationWarning, SpecificationError, warn
-from kineme.validation import Array, as_numbers, check_number
+from kineme.validation import Array, as_numbers
 
 _ROUNDING = 1e-9  # of the extent: so far outside counts as at a limit
 _MISSED = 1e-6  # of the largest position: more than this is outside
@@ -432,33 +431,6 @@ def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tupl
             f"{where[0]} cannot; start more slowly, move the via points inside, or use more basis functions"
         )
     return z
-
-
-def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
-    primitive: Batch,
-    start: ArrayLike | None = None,
-    goal: ArrayLike | None = None,
-    duration: float | None = None,
-    velocity: ArrayLike | None = None,
-    via: ViaLike | None = None,
-    end_velocity: ArrayLike | None = None,
-    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
-) -> Plan:
-    """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
-    check_one(len(primitive))
-    if duration is not None:
-        check_number("duration", duration, above=0.0)
-    d = primitive.n_dims
-    movement = rollout(
-        primitive,
-        one_vector("start", start, d),
-        one_vector("goal", goal, d),
-        duration,
-        one_vector("velocity", velocity, d),
-    )
-    targets = None if via is None else via_points(via, d)
-    movement = modulated(movement, targets, one_vector("end_velocity", end_velocity, d), position_limits)
-    return plan_along(movement, d, targets)
 
 
 def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
