@@ -56,7 +56,14 @@ class Smooth:
         smoothed = np.empty_like(demonstrations.positions)
 
         def smooth_tile(start: int, stop: int) -> None:
-            _fill_smoothed(demonstrations, start, stop, self.cutoff, smoothed)
+            offsets, scales = _tile(demonstrations, start, stop, self.cutoff)
+            times, positions = demonstrations.movements.spread, demonstrations.positions
+            if _compiled(demonstrations, offsets):
+                splines = compiled_module("kineme.movements.preparation._splines")
+                splines.fill_smoothed(times, positions, offsets, scales, smoothed)
+                return
+            starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
+            smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
 
         for_tiles(smooth_tile, len(demonstrations), _TILE_MOVEMENTS)
         return replace(demonstrations.movements.positions_only, positions=smoothed)
@@ -79,18 +86,6 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
     rows = np.empty((stop - start, demonstrations.n_dims, n_points))
     compiled_module("kineme.movements.preparation._splines").fill_smooth_rows(times, positions, offsets, scales, rows)
     return rows
-
-
-def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, smoothed: Array) -> None:
-    """Smooth movements start:stop at their own stamps."""
-    offsets, scales = _tile(demonstrations, start, stop, cutoff)
-    times, positions = demonstrations.movements.spread, demonstrations.positions
-    if _compiled(demonstrations, offsets):
-        splines = compiled_module("kineme.movements.preparation._splines")
-        splines.fill_smoothed(times, positions, offsets, scales, smoothed)
-        return
-    starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
-    smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
 
 
 def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:

@@ -119,17 +119,10 @@ class Movements:
         return self._part(offsets - offsets[0], rows, chosen, self.names and self.names[chosen])
 
     def _part(self, offsets: NDArray[np.intp], rows: Any, chosen: Any, names: Names) -> Movements:
-        return Movements(
-            self.positions[rows],
-            offsets,
-            self.durations[chosen],
-            None if self.times is None else self.times[rows],
-            None if self.labels is None else self.labels[chosen],
-            names,
-            self.dimensions,
-            self.channels,
-            None if self.recorded is None else self.recorded[rows],
-        )
+        of_samples, of_movements = ("positions", "times", "recorded"), ("durations", "labels")
+        parts = {name: getattr(self, name) for name in (*of_samples, *of_movements)}
+        own = {name: x[rows if name in of_samples else chosen] for name, x in parts.items() if x is not None}
+        return replace(self, offsets=offsets, names=names, **own)
 
     @property
     def positions_only(self) -> Movements:
