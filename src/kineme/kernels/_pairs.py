@@ -66,9 +66,9 @@ def fill_grid(dims, sides, by_rows, numbers, rotations, squares):  # type: ignor
                 i, j = (chosen[lane], k) if by_rows else (k, chosen[lane])
                 take_rotation(dims, rotations, i, j, work.rotation, lane)
             _compare(dims, sizes, work)
-            for lane in range(width):
-                i, j = (chosen[lane], k) if by_rows else (k, chosen[lane])
-                for part in range(3):
+            for part in range(3):
+                for lane in range(width):
+                    i, j = (start + lane, k) if by_rows else (k, start + lane)
                     squares[part, i, j] = work.squares[part, lane]
 
 

@@ -37,7 +37,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -95,6 +95,9 @@ def _at_least(name: str, value: float, least: int) -> None:
         raise SpecificationError(f"expected {name} of at least {least}, got {value!r}")
 
 
+_ARRAYS = ("tangents", "midpoints", "turning", "points", "point_tangents", "point_turning")
+
+
 @dataclass(frozen=True)
 class Shapes:
     """n movements in d dimensions as segments and points: C-contiguous arrays of float32, made by `shapes_of`.
@@ -144,9 +147,7 @@ class Shapes:
 
     def arrays(self) -> dict[str, Floats]:
         """The arrays by name."""
-        return {
-            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("elastic", "cloud")
-        }
+        return {name: getattr(self, name) for name in _ARRAYS}
 
 
 def shapes_of(

@@ -83,17 +83,7 @@ _MOST_DIMS = 10_000
 
 @dataclass(frozen=True)
 class Averaged(Kernel):
-    """An A-average of per-dimension similarities; made by `averaged`.
-
-    Parameters
-    ----------
-    kernel : Kernel or tuple of n_dims kernels
-        One for all dimensions, or one for each. A width of None is chosen per dimension.
-    n_dims : int
-        The columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
-    mean : str
-        A key of `MEANS`, which says what is proved about positive semi-definiteness.
-    """
+    """An A-average of per-dimension similarities; made by `averaged`, whose parameters are its fields."""
 
     kernel: Kernel | tuple[Kernel, ...]
     n_dims: int
@@ -179,8 +169,9 @@ def averaged(kernel: Kernel | tuple[Kernel, ...], n_dims: int, mean: str = "arit
     Parameters
     ----------
     kernel : Kernel or tuple of n_dims kernels
+        One for all dimensions, or one for each. A width of None is chosen per dimension.
     n_dims : int
-        Dimensions of the movements: the columns are that many equal blocks, Eq. (9).
+        Dimensions of the movements: the columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}
         Arithmetic keeps positive semi-definiteness always, geometric that of infinitely divisible
         kernels (`RBF`, `Laplacian`); of the others nothing is claimed. See `MEANS`.

@@ -68,7 +68,7 @@ class Controller(Generic[S]):
             _limit("velocity_limit", options.velocity_limit, self._n_dims),
             _limit("acceleration_limit", options.acceleration_limit, self._n_dims),
         )
-        self._limited = any(np.isfinite(limit).any() for limit in self._limits)
+        self._limited = any(limit is not None for limit in self._limits)
         self._settle = float(options.settle or plan.settle)
         self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
@@ -310,21 +310,28 @@ class Clock:
 
 
 class Limits(NamedTuple):
-    """Largest velocity and acceleration (d,) of each component, infinite where there is no limit."""
+    """Largest velocity and acceleration (d,) of each component, or None where there is no limit."""
 
-    velocity: Array
-    acceleration: Array
+    velocity: Array | None
+    acceleration: Array | None
 
     def exceeded(self, before: Array, velocity: Array, acceleration: Array, dt: float) -> Status:
         """Status of the limits that a step of dt from the velocity `before` exceeds, by the mean change over it too."""
-        events = Status.VELOCITY_LIMIT if (np.abs(velocity) > self.velocity).any() else _NOTHING
-        largest = np.maximum(np.abs(acceleration), np.abs(velocity - before) / dt)
-        return events | Status.ACCELERATION_LIMIT if (largest > self.acceleration).any() else events
+        events = _NOTHING
+        if self.velocity is not None and (np.abs(velocity) > self.velocity).any():
+            events |= Status.VELOCITY_LIMIT
+        if self.acceleration is not None:
+            largest = np.maximum(np.abs(acceleration), np.abs(velocity - before) / dt)
+            if (largest > self.acceleration).any():
+                events |= Status.ACCELERATION_LIMIT
+        return events
 
 
-def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array:
+def _limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     """A limit as positive (d,), from a number or one per dimension."""
-    array = numbers(name, np.inf if value is None else value)
+    if value is None:
+        return None
+    array = numbers(name, value)
     if array.shape not in ((), (n_dims,)) or not (array > 0).all():
         raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
     return np.broadcast_to(array, n_dims)
