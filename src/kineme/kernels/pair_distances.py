@@ -309,13 +309,9 @@ _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Squared distances (3, n, m) of every movement of A with every one of B: elastic, turning, point cloud.
 
-    - `A`, `B`: n and m movements with the same dimensions d and specifications.
-    - `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
-      onto A's, float32 fastest; of points in the plane or in space, J after each other, those of one, which rotate
-      all. By default nothing is rotated.
-
-    In units of the movements' squared size. The turning distance does not depend on the rotation.
-    Raises `SpecificationError`: dimensions, specifications or the shape of the rotations do not fit.
+    `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
+    onto A's, float32 fastest; of points in the plane or in space, J after each other, those of one, which rotate all.
+    By default nothing is rotated. Distances are in units of the movements' squared size.
     """
     return _grid(A, B, rotations, (_fill_compiled, _fill_plain), _TILE_PAIRS)
 

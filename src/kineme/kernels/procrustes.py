@@ -180,21 +180,16 @@ class Procrustes:
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
         A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
-        d = self.n_dims
-        if self.max_angle == 0 or d not in (2, 3):
+        if self.max_angle == 0 or self.n_dims not in (2, 3):
             return np.broadcast_to(np.eye(self.n_columns), (len(B), self.n_columns, self.n_columns)).copy()
-        return blocks(self._rotations(self.by_coordinates(A), self.by_coordinates(B)), self.n_points)
-
-    def _rotations(self, A: Array, B: Array) -> Array:
-        """The same of one point, rows with the x of all points first."""
-        d = self.n_dims
-        if d == 2:
+        A, B = self.by_coordinates(A), self.by_coordinates(B)
+        if self.n_dims == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
-            return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
-        C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        return best_rotations(C, self.max_angle)
+            return blocks(np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), self.n_points)
+        C = A.reshape(len(A), 3, -1) @ B.reshape(len(B), 3, -1).transpose(0, 2, 1)
+        return blocks(best_rotations(C, self.max_angle), self.n_points)
 
     def _soft_in_plane(self, A: Prepared, B: Prepared, rotations: bool) -> tuple[Array, NDArray[np.float32] | None]:
         """Best products (n, m) under the prior, and cosines and sines (n, m, 2)."""

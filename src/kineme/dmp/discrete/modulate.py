@@ -259,10 +259,7 @@ def _stretch(targets: ViaPoints) -> Array:
 
 
 def mixed_factor(dmp: Specification, factor: Array) -> Array:
-    """Of the covariance of all weights (d N): r demonstrations' spread, and smoothness that is worth ten of them.
-
-    Smooth changes, which are as large, have the share ``10 / (r + 10)``: demonstrations vary in r directions only.
-    """
+    """Of the covariance of all weights (d N): r demonstrations' spread, and smoothness with the share 10 / (r + 10)."""
     r, d, _ = factor.shape
     share = _WORTH / (r + _WORTH)
     shown = np.sqrt(1.0 - share) * factor.reshape(r, -1)
@@ -300,10 +297,7 @@ def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Arra
 
 
 def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
-    """The same (m, p), of the weights of one or more dimensions of one movement.
-
-    Rows of a stretch, `stretch` (k,) being 1, are met so closely that the path, by `looks` (N, T), does not swing.
-    """
+    """The same (m, p), with rows of a `stretch` (k,) met as closely as the path, by `looks`, does not swing."""
     change = changes(factor, observed, errors, SLACK * stretch)
     if not stretch.any():
         return change
@@ -331,10 +325,7 @@ def looks_of(dmp: Specification) -> Array:
 def within_limits(
     movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array, slack: Array
 ) -> Rollout:
-    """The movement within limits (low, high), with ``held @ W`` (K,) as it is.
-
-    It is held at `points` (1 or n, k, d), with `slack` (K,) as a share of what each deviates under the covariance.
-    """
+    """The movement within limits (low, high), with via points and ``held @ W`` as they are, but for their slack."""
     low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
     rounding = _ROUNDING * movement.primitives.row("extents").max(axis=1)[:, None]  # (1 or n, 1)

@@ -92,10 +92,7 @@ class RhythmicRollout(BaseRollout):
 
 
 def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[Array, Array], order: int) -> Array:
-    """The x - b (n, d, T), or a derivative in u, on the limit cycle of weights (1 or n, d, N), times the ratio (n,).
-
-    `when` is the phases (n,) of the movements and how many radians past them (T,).
-    """
+    """The x - b (n, d, T), or a derivative in u, on the limit cycle, at `when`: phases (n,), radians past them (T,)."""
     (phases, turn), response = when, limit_cycle(dmp)
     harmonics = np.arange(response.shape[1])
     response = response * (2j * np.pi * harmonics) ** order

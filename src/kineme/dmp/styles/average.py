@@ -43,8 +43,7 @@ class AveragePrimitive:
     ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
 
     - `primitive`: the mean, a batch of one: roll it out, describe it, control with it as with any other. It knows
-      nothing of the covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points
-      as the demonstrations would.
+      nothing of the covariance, see `rollout`.
     - `factor` (r, d, N + 3): centered, weighted deviations of theta from the mean; r is at most n and at most d (N +
       3).
     - `tempo_factor` (r,): the same for ln tau.

@@ -171,8 +171,8 @@ def period_by_unit(unit: str | None) -> float | None:
 def period_of(angles: Array, unit: str | None) -> float:
     """The period of an angle: by its unit, or, where that says nothing, by its values.
 
-    These are taken for radians within one turn, else for degrees; beyond a turn of those nothing wraps, and the period
-    is infinite. So it is where whole turns are all that moves: a switch between 0 and 360.
+    These are taken for radians within one turn, else for degrees; beyond a turn of those, and where only whole turns
+    move, as a switch between 0 and 360, nothing wraps, and the period is infinite.
     """
     if (period := period_by_unit(unit)) is not None:
         return period

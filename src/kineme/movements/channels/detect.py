@@ -258,11 +258,7 @@ def _unit_norms(q: Array) -> bool:
 
 
 def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
-    """The order of a numbered quaternion, whose signs change where its scalar would become negative.
-
-    Many programs write quaternions with a scalar that is not negative. Its column then stays so on both sides of
-    every change of sign, which the other end of the quaternion does not.
-    """
+    """The order of a numbered quaternion: many programs write a scalar that is not negative, beside changes of sign."""
     changes = (q[1:] * q[:-1]).sum(axis=1) < 0
     changes[offsets[1:-1] - 1] = False
     beside = np.concatenate((q[:-1][changes], q[1:][changes]))
@@ -281,10 +277,7 @@ _NO_PLACES = _OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "eu
 
 
 def point_names(channels: Channels | None) -> tuple[str, ...]:
-    """Return names of the points that the columns are, one after the other: x, y, z or x, y of each, under one name.
-
-    None where they are anything else: one point, other quantities, other orders, or no names.
-    """
+    """Return names of the points whose x, y, z or x, y the columns are, one after the other; none of anything else."""
     for axes in ("xyz", "xy"):
         n, d = len(channels or ()), len(axes)
         if channels is None or n < 2 * d or n % d:

@@ -72,9 +72,8 @@ class Smooth:
 def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, n_points: int) -> Array:
     """Smoothing splines of movements start:stop, see `Smooth`, at `n_points` even times: (stop - start, d, n_points).
 
-    The smoothing splines themselves are evaluated, from their second derivatives; `Smooth` followed by `Resample`
-    would fit other splines through their values. The first recorded position is subtracted, so that a large offset
-    costs no digits.
+    These splines themselves are evaluated; `Smooth` followed by `Resample` would fit others through their values. The
+    first recorded position is subtracted, so that a large offset costs no digits.
     """
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.movements.spread, demonstrations.positions
@@ -157,11 +156,7 @@ def even_rows_of_spline(v: Array, x: Array, m: Array, offsets: NDArray[np.intp],
 
 @lru_cache(maxsize=64)
 def spline_matrix(n_in: int, n_out: int) -> Array:
-    """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples.
-
-    With the B-spline values B at the samples and C at the points, the map is ``C B^-1``; solving with the transposed,
-    banded B needs no more memory than the result.
-    """
+    """The linear map (n_out, n_in) between even samples: ``C B^-1``, of B-spline values B at the ones, C at others."""
     from scipy.interpolate import BSpline
     from scipy.sparse.linalg import splu
 
@@ -179,9 +174,7 @@ def spline_matrix(n_in: int, n_out: int) -> Array:
 def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n_points: int) -> Array:
     """Interpolate movements on `n_points` even values of their parameter, relative to their start, (n, d, n_points).
 
-    The parameter (total,) is strictly increasing within each movement: time, or arc length. Movement i holds the
-    samples ``offsets[i]:offsets[i + 1]`` of it and of the positions (total, d). A large offset of these costs no
-    digits.
+    The parameter (total,) increases within each movement: time, or arc length.
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))

@@ -63,7 +63,7 @@ class Roles(NamedTuple):
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
-    """Find the roles of columns by their heads and what they hold, "number", "date" or "text"; choices take precedence.
+    """Find roles by heads and by what columns hold, "number", "date" or "text"; choices take precedence.
 
     In a file without heads, not `named`, the first column of numbers is time and the others are coordinates.
     """
