@@ -222,8 +222,7 @@ class RotationPrior:
     tilt: float = 0.5
 
     def __post_init__(self) -> None:
-        if self.concentration is not None:
-            check_number("concentration", self.concentration, least=0.0)
+        check_number("concentration", self.concentration, least=0.0, optional=True)
         check_number("tilt", self.tilt, least=0.0)
         if self.vertical is not None:
             object.__setattr__(self, "vertical", _direction(self.vertical))

@@ -375,8 +375,7 @@ class Primitives(Batch):
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         check_one(len(self))
-        if duration is not None:
-            check_number("duration", duration, above=0.0)
+        check_number("duration", duration, above=0.0, optional=True)
         vectors = {"start": start, "goal": goal, "velocity": velocity, "end_velocity": end_velocity}
         x0, g, v0, end = (one_vector(name, vector, self.n_dims) for name, vector in vectors.items())
         targets = None if via is None else via_points(via, self.n_dims)

@@ -317,8 +317,7 @@ class PosePrimitives(Batch):
         Raises `SpecificationError` or `TrajectoryError`: more than one primitive; an option out of its range; a start
         or goal that is no pose.
         """
-        if duration is not None:
-            check_number("duration", duration, above=0.0)
+        check_number("duration", duration, above=0.0, optional=True)
         movement, references = self._asked_for(start, goal, duration, velocity)
         changes = changes_in_tangent(movement, references, via, end_velocity, position_limits)
         plan = plan_along(modulated(movement, *changes), self.n_positions, changes[0])

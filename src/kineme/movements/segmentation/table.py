@@ -72,8 +72,7 @@ class Rest:
     def __post_init__(self) -> None:
         check_number("speed", self.speed, above=0.0, below=0.5)
         for name in ("min_rest", "min_movement"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), least=0.0)
+            check_number(name, getattr(self, name), least=0.0, optional=True)
 
     @property
     def resolution(self) -> float:
@@ -154,8 +153,7 @@ class SpeedMinima:
             check_number("turn", self.turn, above=0.0)
             if self.turn >= np.pi:
                 raise SpecificationError(f"expected turn below pi, got {self.turn!r}; angles are in radians")
-        if self.min_movement is not None:
-            check_number("min_movement", self.min_movement, least=0.0)
+        check_number("min_movement", self.min_movement, least=0.0, optional=True)
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
