@@ -96,7 +96,8 @@ def in_words(channels: Channels | None) -> str:
 def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
     """Refuse channels whose columns do not mean the same, where that is known; `what` messages call each of `several`.
 
-    Columns of other names may be the other hand's: they need the same kinds, and not the same names in another order.
+    Columns of equal names are the same, whatever their kinds were guessed to be. Those of other names may be the other
+    hand's: they need the same kinds, and not the same names in another order.
     """
     detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
     for i, channels in detected[1:]:

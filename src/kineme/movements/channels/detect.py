@@ -258,7 +258,11 @@ def _unit_norms(q: Array) -> bool:
 
 
 def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
-    """The order of a numbered quaternion: many programs write a scalar that is not negative, beside changes of sign."""
+    """The order of a numbered quaternion, whose signs change where its scalar would become negative.
+
+    Many programs write no negative scalar. Its column then stays so on both sides of every change of sign, which the
+    other end of the quaternion does not.
+    """
     changes = (q[1:] * q[:-1]).sum(axis=1) < 0
     changes[offsets[1:-1] - 1] = False
     beside = np.concatenate((q[:-1][changes], q[1:][changes]))
