@@ -235,8 +235,11 @@ def check_number(  # noqa: PLR0913 - bounds of every kind
     below: float | None = None,
     most: float = LARGEST,
     smallest: float = 1 / LARGEST,
+    optional: bool = False,
 ) -> None:
     """Refuse a parameter that is not a finite number in its range, or too close to 0 to be divided by."""
+    if optional and value is None:
+        return
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
     bound += "" if below is None else f" and below {below:g}"
     try:

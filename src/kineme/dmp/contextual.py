@@ -125,8 +125,7 @@ class Contextual(BaseEstimator):
         if not isinstance(self.dmp, DMP | None):
             raise SpecificationError(f"expected dmp to be a kineme.DMP, got {type(self.dmp).__name__}")
         for name in ("length_scale", "noise"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), above=0.0)
+            check_number(name, getattr(self, name), above=0.0, optional=True)
         primitives = as_primitives(movements, self.dmp)
         if self.dmp is not None and primitives.dmp != self.dmp:
             raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {primitives.dmp}")

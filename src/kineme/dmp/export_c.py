@@ -13,7 +13,6 @@ import numpy as np
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.discrete.specification import CLOSED, HANDOVER, ZERO
 from kineme.errors import SpecificationError
-from kineme.validation import Array
 
 _LONGEST_NAME = 40
 _WIDTH = 110  # of lines of tables
@@ -58,29 +57,6 @@ _RATIOS = {
     for (k = 0; k < ${p}_dims && ${p}_distance > 0; k++)
         ratio[k] = (${p}_real)sqrt(sum) / ${p}_distance;
 """,
-}
-
-#: Constant -> its comment.
-_MEANING = {
-    "weights": "by function and dimension, times the scale of f",
-    "centers": "c_i",
-    "widths": "square roots of h_i",
-    "x0": "start",
-    "g": "goal",
-    "v0": "velocity at the start, per duration",
-    "tau": "duration [s]",
-    "K": "stiffness",
-    "D": "damping",
-    "a": "D / 2",
-    "b": "sqrt(|K - D * D / 4|)",
-    "slow": "rate of the slow pole",
-    "alpha": "of the phase s = exp(-alpha u)",
-    "end": "phase at u = 1",
-    "late": "cube of the phase at which shape and goal weigh the same",
-    "learned": "goal - start, 0 where that is rounding",
-    "nothing": "of goal - start: rounding",
-    "distance": "from start to goal; 0 if the movement is closed",
-    "intervals": "in a duration, at least",
 }
 
 _HEADER = """\
@@ -346,28 +322,28 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
         ratio=_RATIOS.get(dmp.formulation, ""),
         sum=", sum = 0" if dmp.formulation == "amplitude-scaled" else "",
     )
-    tables: dict[str, Any] = {
-        "weights": primitive.scaled_weights[0].T,
-        "centers": dmp.basis.centers,
-        "widths": np.sqrt(dmp.basis.widths),
-        "x0": primitive.starts[0],
-        "g": primitive.goals[0],
-        "v0": primitive.velocities[0] * primitive.durations[0],
-        "tau": primitive.durations[0],
-        "K": dmp.K,
-        "D": dmp.D,
-        "a": a,
-        "b": b,
-        "slow": dmp.K / (a + b),
-        "alpha": dmp.basis.phase.alpha,
-        "end": dmp.basis.phase.end,
-        "late": HANDOVER**3,
-        "learned": np.where(np.abs(learned) <= ZERO * extent, 0.0, learned),
-        "nothing": ZERO * extent,
-        "distance": 0.0 if distance <= CLOSED * extent else distance,
-        "intervals": intervals,
+    tables: dict[str, tuple[Any, str]] = {
+        "weights": (primitive.scaled_weights[0].T, "by function and dimension, times the scale of f"),
+        "centers": (dmp.basis.centers, "c_i"),
+        "widths": (np.sqrt(dmp.basis.widths), "square roots of h_i"),
+        "x0": (primitive.starts[0], "start"),
+        "g": (primitive.goals[0], "goal"),
+        "v0": (primitive.velocities[0] * primitive.durations[0], "velocity at the start, per duration"),
+        "tau": (primitive.durations[0], "duration [s]"),
+        "K": (dmp.K, "stiffness"),
+        "D": (dmp.D, "damping"),
+        "a": (a, "D / 2"),
+        "b": (b, "sqrt(|K - D * D / 4|)"),
+        "slow": (dmp.K / (a + b), "rate of the slow pole"),
+        "alpha": (dmp.basis.phase.alpha, "of the phase s = exp(-alpha u)"),
+        "end": (dmp.basis.phase.end, "phase at u = 1"),
+        "late": (HANDOVER**3, "cube of the phase at which shape and goal weigh the same"),
+        "learned": (np.where(np.abs(learned) <= ZERO * extent, 0.0, learned), "goal - start, 0 where that is rounding"),
+        "nothing": (ZERO * extent, "of goal - start: rounding"),
+        "distance": (distance * (distance > CLOSED * extent), "from start to goal; 0 if the movement is closed"),
+        "intervals": (intervals, "in a duration, at least"),
     }
-    largest = max(np.abs(table).max() for table in tables.values())
+    largest = max(np.abs(values).max() for values, _ in tables.values())
     used = {key: table for key, table in tables.items() if re.search(rf"\{{p\}}_{key}\b", text)}
     return Template(text).substitute(
         p=p,
@@ -382,15 +358,12 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
         columns=", ".join(
             re.sub(r"[^\w .()\[\]-]", "_", column, flags=re.ASCII) for column in exported_columns(primitive)
         ),
-        tables="".join(_c_table(p, key, np.asarray(table)) for key, table in used.items()),
+        tables="".join(_c_table(p, key, *table) for key, table in used.items()),
     )
 
 
 def c_name(name: str) -> str:
-    """Return what the identifiers of a header begin with: letters, digits and single underscores, a letter first.
-
-    A suffix always follows, so a word that C reserves may begin an identifier.
-    """
+    """Return what the identifiers of a header begin with, before suffixes: letters, digits, single underscores."""
     words = re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")[:_LONGEST_NAME].strip("_")
     return words if words[:1].isalpha() else f"movement_{words}".strip("_")
 
@@ -415,12 +388,13 @@ def exported_columns(primitive: Primitives) -> list[str]:
     return primitive.plain_names[0] if about is None else list(about.column_names)
 
 
-def _c_table(prefix: str, name: str, values: Array) -> str:
+def _c_table(prefix: str, name: str, numbers: Any, meaning: str) -> str:
     """Numbers as a constant of C, in digits that read back exactly."""
+    values = np.asarray(numbers)
     shape = "".join(f"[{n}]" for n in values.shape)
     rows = [", ".join(map(repr, row)) for row in np.atleast_2d(values).tolist()]
     if values.ndim < 2:
         text = rows[0] if values.ndim == 0 else textwrap.fill(f"{{{rows[0]}}}", _WIDTH, subsequent_indent="    ")
     else:
         text = "{\n    " + ",\n    ".join(f"{{{row}}}" for row in rows) + "\n}"
-    return f"static const {prefix}_real {prefix}_{name}{shape} = {text}; /* {_MEANING[name]} */\n"
+    return f"static const {prefix}_real {prefix}_{name}{shape} = {text}; /* {meaning} */\n"

@@ -211,8 +211,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
     check_choice("method", method, list(METHODS))
     check_number("exploration", exploration, above=0.0, most=_WIDEST)
     check_number("smallest", smallest, least=0.0)
-    if target is not None:
-        check_number("target", target)
+    check_number("target", target, optional=True)
     check_switch("progress", progress)
     if not callable(cost):
         raise SpecificationError(f"expected cost to be a function of a Rollout, got {cost!r}")

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names, same_columns
-from kineme.movements.channels.coordinates import columns_of
+from kineme.movements.channels.coordinates import columns_of, columns_of_kinds
 from kineme.movements.preparation.trim import Step, TrimRest, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements, of_channels
+from kineme.movements.trajectories.movements import Movements, of_channels, samples_of
 from kineme.validation import Array
 
 _ROUNDING = 1e-9  # of a duration: shares that are equal but for rounding
@@ -85,8 +85,7 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
     channels = movements.channels
     if channels is None:
         return None
-    columns = [k for k, kind in enumerate(c.kind for c in channels for _ in c.columns) if kind == "discrete"]
-    if not columns:
+    if not (columns := columns_of_kinds(channels, "discrete")):
         return RecordedAs(channels)
     trimmed = preprocess(movements, [step for step in steps if isinstance(step, TrimRest)])
     return RecordedAs(channels, steps_of(trimmed, columns))
@@ -105,11 +104,9 @@ def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
 
 def primitive_columns(channels: Channels) -> list[int]:
     """Numbers of the columns of a recording in the order of a primitive's, which has no discrete ones."""
-    named = list(zip(channels, columns_of(channels), strict=True))
-    plain = [
-        k for channel, some in named if channel.kind in ("position", "angle") for k in range(some.start, some.stop)
-    ]
+    named = zip(channels, columns_of(channels), strict=True)
     turned = [(channel.order, some.start) for channel, some in named if channel.kind == "orientation"]
+    plain = columns_of_kinds(channels, "position", "angle")
     return plain + [start + order.index(part) for order, start in turned for part in "wxyz"]
 
 
@@ -155,9 +152,7 @@ class DiscreteSteps:
 
     def take(self, chosen: NDArray[np.intp]) -> DiscreteSteps:
         """The steps of the chosen movements, in that order."""
-        lengths = np.diff(self.offsets)[chosen]
-        offsets = np.concatenate(([0], np.cumsum(lengths)))
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[:-1][chosen] - offsets[:-1], lengths)
+        offsets, rows = samples_of(self.offsets, chosen)
         return DiscreteSteps(self.values[rows], self.shares[rows], offsets)
 
 

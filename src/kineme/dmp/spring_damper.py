@@ -28,10 +28,8 @@ class SpringDamper:
     def _check_spring_damper(self) -> None:
         check_choice("fit", self.fit, FITS)
         check_number("stiffness", self.stiffness, above=0.0)
-        if self.damping is not None:
-            check_number("damping", self.damping, above=0.0)
-        if self.ridge is not None:
-            check_number("ridge", self.ridge, least=0.0)
+        check_number("damping", self.damping, above=0.0, optional=True)
+        check_number("ridge", self.ridge, least=0.0, optional=True)
 
     @property
     def K(self) -> float:

@@ -93,15 +93,8 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
 _sum = jit(_sum_over_coordinates, cache=False, reorder=False)
 
 
-@register_jitable
-def _absolute(x: Any, y: Any, c: Any) -> Any:
-    return abs(x - y)
-
-
-@register_jitable
-def _squared(x: Any, y: Any, c: Any) -> Any:
-    t = x - y
-    return t * t
+_absolute = register_jitable(lambda x, y, c: abs(x - y))
+_squared = register_jitable(lambda x, y, c: (x - y) * (x - y))
 
 
 @register_jitable

@@ -1,4 +1,4 @@
-"""Vectors of 16 numbers for compiled functions, one number for each of 16 pairs. Importing this imports Numba.
+"""Vectors of 16 numbers for compiled functions, one number for each of 16 pairs.
 
 A compiled function that works on such a vector as if it were one number processes 16 pairs at once. The processor's
 vectors may be shorter: LLVM then uses several of them. Every pair goes through the same operations, so its result
@@ -103,10 +103,8 @@ def transpose(_context, rows, chosen, column, factor, array, row):  # type: igno
             index = builder.load(builder.gep(picked, [ir.Constant(ir.IntType(64), lane)]))
             at = builder.gep(source.data, [builder.add(builder.mul(index, length), values[2])])
             lanes.append(builder.load(builder.bitcast(at, _FLOAT.as_pointer()), align=4))
-        first, each = (
-            _row(context, builder, (signature.args[4], values[4]), values[5]),
-            _splat(builder, values[3], _FLOAT),
-        )
+        first = _row(context, builder, (signature.args[4], values[4]), values[5])
+        each = _splat(builder, values[3], _FLOAT)
         for k, vector in enumerate(_transposed(builder, lanes)):
             at = builder.gep(first, [ir.Constant(ir.IntType(64), k)])
             builder.store(builder.fmul(vector, each), at, align=4)
@@ -186,11 +184,8 @@ def product(_context, vector, array, row):  # type: ignore[no-untyped-def]
 
     def code(context, builder, signature, values):  # type: ignore[no-untyped-def]
         first = _row(context, builder, (signature.args[1], values[1]), values[2])
-        return _sum_of_products(
-            builder,
-            [builder.extract_value(values[0], k) for k in range(len(vector))],
-            _following(builder, first, len(vector)),
-        )
+        members = [builder.extract_value(values[0], k) for k in range(len(vector))]
+        return _sum_of_products(builder, members, _following(builder, first, len(vector)))
 
     return _floats(vector, array, types.intp), code
 
@@ -243,42 +238,21 @@ def bit(_context, position):  # type: ignore[no-untyped-def]
     return _integers(types.intp), code
 
 
-@_operation
-def plus(_context, a, b):  # type: ignore[no-untyped-def]
-    """A + b."""
-    return _floats(a, b), lambda _c, builder, _s, v: builder.fadd(v[0], v[1])
+def _of_two(write: Callable[[Any, Any, Any], Any]) -> Callable[..., Any]:
+    """An operation on two vectors of floats, which ``write(builder, a, b)`` builds."""
+
+    @_operation
+    def operation(_context, a, b):  # type: ignore[no-untyped-def]
+        return _floats(a, b), lambda _c, builder, _s, values: write(builder, *values)
+
+    return operation
 
 
-@_operation
-def minus(_context, a, b):  # type: ignore[no-untyped-def]
-    """A - b."""
-    return _floats(a, b), lambda _c, builder, _s, v: builder.fsub(v[0], v[1])
-
-
-@_operation
-def times(_context, a, b):  # type: ignore[no-untyped-def]
-    """A b."""
-    return _floats(a, b), lambda _c, builder, _s, v: builder.fmul(v[0], v[1])
-
-
-@_operation
-def least(_context, a, b):  # type: ignore[no-untyped-def]
-    """The smaller of a and b."""
-
-    def code(_context, builder, _signature, v):  # type: ignore[no-untyped-def]
-        return builder.select(builder.fcmp_ordered("<", v[0], v[1]), v[0], v[1])
-
-    return _floats(a, b), code
-
-
-@_operation
-def largest(_context, a, b):  # type: ignore[no-untyped-def]
-    """The larger of a and b."""
-
-    def code(_context, builder, _signature, v):  # type: ignore[no-untyped-def]
-        return builder.select(builder.fcmp_ordered(">", v[0], v[1]), v[0], v[1])
-
-    return _floats(a, b), code
+plus = _of_two(lambda builder, a, b: builder.fadd(a, b))
+minus = _of_two(lambda builder, a, b: builder.fsub(a, b))
+times = _of_two(lambda builder, a, b: builder.fmul(a, b))
+least = _of_two(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
+largest = _of_two(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
 
 
 @_operation

@@ -1,10 +1,8 @@
-"""Compiled distances of pairs, twins of those in ``pair_distances.py``: 16 pairs at once.
+"""Compiled distances of pairs, twins of those in ``pair_distances.py``: 16 at once.
 
-Blocks of 16 movements for compiled distances of pairs: one movement in each lane. Importing this imports Numba.
-
-The rows of a block are the numbers of a movement's shape, one array after the other, as `begins_of` says, each times
-the root of its weight. The tuple `dims` is as long as a movement has dimensions: its type tells the compiler that
-number.
+A block holds 16 movements, one in each lane. Its rows are the numbers of a movement's shape, one array after the other,
+as `begins_of` says, each times the root of its weight. The tuple `dims` is as long as a movement has dimensions: its
+type tells the compiler that number.
 """
 
 from __future__ import annotations
@@ -45,48 +43,33 @@ _jit = partial(jit, reorder=False)
 
 
 @_jit
-def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
+def fill_grid(dims, sides, by_rows, numbers, rotations, squares):  # type: ignore[no-untyped-def]
     """``squares[:, i, j]``, the three squared distances of every movement of A with every one of B.
 
-    `sides` are A and B, each with its tangents, midpoints, turning angles, points, their tangents and turning angles,
-    a movement's numbers in one row; `numbers` the roots of their weights, and the sizes: segments, band and points;
-    `rotations` (n, m, r) the entries of matrices, r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
+    `sides` are (B, A), of which 16 movements of B are compared at once, or with `by_rows` (A, B) and 16 of A, which is
+    the same to the last bit. Each has its tangents, midpoints, turning angles, points, their tangents and turning
+    angles, a movement's numbers in one row; `numbers` are the roots of their weights, and the sizes: segments, band and
+    points; `rotations` (n, m, r) the entries of matrices, r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
     """
-    (A, B), (_, sizes) = sides, numbers
+    (many, few), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
-    work, second = new_work(dims, sizes), np.zeros(LANES, np.intp)
-    for start in range(0, m, LANES):
-        width = _choose(start, m, second)
-        pack(dims, B, second, numbers, work.b)
-        for i in range(n):
-            if n > 1 or start == 0:
-                pack_everywhere(dims, A, i, numbers, work.a)
+    n_many, n_few = (n, m) if by_rows else (m, n)
+    work, chosen = new_work(dims, sizes), np.zeros(LANES, np.intp)
+    packed, repeated = (work.a, work.b) if by_rows else (work.b, work.a)
+    for start in range(0, n_many, LANES):
+        width = _choose(start, n_many, chosen)
+        pack(dims, many, chosen, numbers, packed)
+        for k in range(n_few):
+            if n_few > 1 or start == 0:
+                pack_everywhere(dims, few, k, numbers, repeated)
             for lane in range(LANES):
-                take_rotation(dims, rotations, i, second[lane], work.rotation, lane)
+                i, j = (chosen[lane], k) if by_rows else (k, chosen[lane])
+                take_rotation(dims, rotations, i, j, work.rotation, lane)
             _compare(dims, sizes, work)
-            for k in range(3):
+            for part in range(3):
                 for lane in range(width):
-                    squares[k, i, start + lane] = work.squares[k, lane]
-
-
-@_jit
-def fill_by_rows(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
-    """The same as `fill_grid`, to the last bit, with 16 movements of A at once instead of 16 of B."""
-    (A, B), (_, sizes) = sides, numbers
-    n, m = squares.shape[1], squares.shape[2]
-    work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
-    for start in range(0, n, LANES):
-        width = _choose(start, n, first)
-        pack(dims, A, first, numbers, work.a)
-        for j in range(m):
-            if m > 1 or start == 0:
-                pack_everywhere(dims, B, j, numbers, work.b)
-            for lane in range(LANES):
-                take_rotation(dims, rotations, first[lane], j, work.rotation, lane)
-            _compare(dims, sizes, work)
-            for k in range(3):
-                for lane in range(width):
-                    squares[k, start + lane, j] = work.squares[k, lane]
+                    i, j = (start + lane, k) if by_rows else (k, start + lane)
+                    squares[part, i, j] = work.squares[part, lane]
 
 
 @_jit
@@ -111,10 +94,7 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 @_jit
 def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # type: ignore[no-untyped-def]
-    """``squares[:2, i, j]``, the bounds of `elastic_bounds`, and ``squares[2, i, j]``, of clouds, where there is room.
-
-    For 16 movements of A at once.
-    """
+    """``squares[:2, i, j]`` as `elastic_bounds`, ``squares[2, i, j]`` of clouds if there is room; 16 of A at once."""
     (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
@@ -292,10 +272,7 @@ def new_work(dims, sizes):  # type: ignore[no-untyped-def]
 
 @_jit
 def begins_of(dims, sizes):  # type: ignore[no-untyped-def]
-    """First rows of tangents, midpoints, turning angles; points, their tangents, turning angles, half squared lengths.
-
-    The length is that of the weighted tangent of a point.
-    """
+    """First rows of tangents, midpoints, turning angles; points, weighted tangents, turning angles, half squares."""
     n_segments, _, n_points = sizes
     t, points = n_segments * len(dims), n_segments * (2 * len(dims) + 1)
     x = n_points * len(dims)

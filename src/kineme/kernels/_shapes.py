@@ -1,7 +1,4 @@
-"""Compiled twin of `pair_distances.shapes_of`: each movement's arrays are filled while it is in the cache.
-
-Importing this imports Numba.
-"""
+"""Compiled twin of `pair_distances.shapes_of`: each movement's arrays are filled while it is in the cache."""
 
 from __future__ import annotations
 

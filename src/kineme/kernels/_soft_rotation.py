@@ -1,8 +1,4 @@
-"""Compiled best rotations in space under a prior: twins of those in ``rotation.py``, several pairs at once.
-
-Each pair has its own vector lane and goes through the same steps whatever its company: a lane that has converged keeps
-its number while others go on.
-"""
+"""Compiled best rotations in space under a prior: twins of those in ``rotation.py``; for lanes see `_rotation`."""
 
 from __future__ import annotations
 
@@ -15,7 +11,6 @@ from kineme.kernels.rotation import CONVERGED, NEWTON_STEPS, ROUNDING, TIE, TIE_
 from kineme.runtime.compiled import jit
 
 _LANES = 32  # pairs at once: with fewer the processor waits for roots and divisions
-_FIRST, _SECOND, _THIRD = TIE_BREAK
 
 
 class _Lanes(NamedTuple):
@@ -155,8 +150,7 @@ def _break_ties(lanes, width):  # type: ignore[no-untyped-def]
     tied = False
     for lane in range(width):
         if not abs(lanes.divisor[lane]) >= TIE:
-            lanes.M[0, 0, lane] += _FIRST
-            lanes.M[1, 1, lane] += _SECOND
-            lanes.M[2, 2, lane] += _THIRD
+            for k in range(3):
+                lanes.M[k, k, lane] += TIE_BREAK[k]
             tied = True
     return tied

@@ -43,14 +43,7 @@ class Parameters:
         return replace(self, **{name: _copy(getattr(self, name)) for name in _names(self)})  # type: ignore[type-var]
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Parameters by name.
-
-        Parameters
-        ----------
-        deep : bool
-            Whether to add the parameters of kernels inside, as ``kernel__sigma``, or ``kernel__0__sigma`` for the
-            first of several.
-        """
+        """Parameters by name; `deep` ones of a kernel inside as ``kernel__sigma``, of several ``kernel__0__sigma``."""
         parameters = {name: getattr(self, name) for name in _names(self)}
         if deep:
             for name in tuple(parameters):
@@ -58,14 +51,10 @@ class Parameters:
         return parameters
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set parameters by name, in place, and return the kernel.
+        """Set parameters by name, in place, and return the kernel; kernels inside are replaced: others may share them.
 
-        Kernels inside are replaced, not changed: others may share them.
-
-        Raises
-        ------
-        SpecificationError
-            A name that is no parameter, a value out of range, or a kernel that was hashed. The kernel is unchanged.
+        Raises `SpecificationError`, and changes nothing: a name that is no parameter, a value out of range, or a kernel
+        that was hashed.
         """
         if parameters and self.__dict__.get("_hashed"):
             raise SpecificationError(
@@ -207,10 +196,7 @@ class Kernel(Parameters, ABC):
 
 
 def checked_pair(A: ArrayLike, B: ArrayLike | None) -> tuple[Rows, Rows | None]:
-    """Check two sets of rows; B becomes None where both are the same object.
-
-    scikit-learn calls ``kernel(X, X)`` with its training rows; recognizing that saves half of the work.
-    """
+    """Check two sets of rows; B becomes None where both are one object, as scikit-learn calls: half of the work."""
     if B is None or B is A:
         return checked_rows(A, "A"), None
     A, B = checked_rows(A, "A"), checked_rows(B, "B")
@@ -224,11 +210,7 @@ def checked_pair(A: ArrayLike, B: ArrayLike | None) -> tuple[Rows, Rows | None]:
 
 
 def checked_rows(X: ArrayLike, name: str = "X") -> Rows:
-    """Rows (n, p) as a read-only C-contiguous array; float32 stays, all else becomes float64.
-
-    Raises `SpecificationError`: not numbers, not two-dimensional, no column, or a value that is NaN, infinite or so
-    large that its square would overflow.
-    """
+    """Check rows (n, p), and return them read-only and C-contiguous; float32 stays, all else becomes float64."""
     rows = np.asarray(X)
     if rows.ndim != 2:
         raise SpecificationError(
@@ -257,11 +239,7 @@ def checked_rows(X: ArrayLike, name: str = "X") -> Rows:
 
 
 def contiguous(rows: Rows, dtype: np.dtype[np.floating]) -> Rows:
-    """Read-only C-contiguous view or copy of `rows`.
-
-    Read-only even if the caller's array is writable: no code can write to it by mistake, and the compiled
-    loops need one signature per dtype instead of two.
-    """
+    """Read-only C-contiguous view or copy of `rows`: compiled loops need one signature per dtype instead of two."""
     view = np.ascontiguousarray(rows, dtype).view()
     view.flags.writeable = False
     return view

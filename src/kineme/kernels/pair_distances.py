@@ -36,9 +36,9 @@ triangle inequality.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -62,35 +62,25 @@ _NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding e
 
 @dataclass(frozen=True)
 class ElasticSpec:
-    """Options of comparing segments by dynamic time warping; see the module.
-
-    `position_weight`, `turning_weight`: weights of the squared differences of midpoints and of turning angles / pi;
-    that of tangents is 1.
-    """
+    """Options of comparing segments by dynamic time warping; see the module."""
 
     n_segments: int = 33  # segments of a path, at least 3
     band: int = 6  # a segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978)
-    position_weight: float = 0.5
-    turning_weight: float = 8.0
+    position_weight: float = 0.5  # of squared differences of midpoints; that of tangents is 1
+    turning_weight: float = 8.0  # of turning angles / pi
 
     def __post_init__(self) -> None:
-        _at_least("n_segments", self.n_segments, 3)
-        _at_least("band", self.band, 0)
-        _at_least("position_weight", self.position_weight, 0)
-        _at_least("turning_weight", self.turning_weight, 0)
+        for name, least in (("n_segments", 3), ("band", 0), ("position_weight", 0), ("turning_weight", 0)):
+            _at_least(name, getattr(self, name), least)
 
 
 @dataclass(frozen=True)
 class CloudSpec:
-    """Options of comparing points as a cloud; see the module.
-
-    `turning_weight`, `line_weight`: weights of the squared difference of turning angles / pi and of the squared sine
-    between the tangents' lines; that of positions is 1.
-    """
+    """Options of comparing points as a cloud; see the module."""
 
     n_points: int = 20  # points of a path, 3 to 32
-    turning_weight: float = 16.0
-    line_weight: float = 0.75
+    turning_weight: float = 16.0  # of squared differences of turning angles / pi; that of positions is 1
+    line_weight: float = 0.75  # of the squared sine between the tangents' lines
 
     def __post_init__(self) -> None:
         _at_least("n_points", self.n_points, 3)
@@ -103,6 +93,9 @@ class CloudSpec:
 def _at_least(name: str, value: float, least: int) -> None:
     if not least <= value < np.inf:
         raise SpecificationError(f"expected {name} of at least {least}, got {value!r}")
+
+
+_ARRAYS = ("tangents", "midpoints", "turning", "points", "point_tangents", "point_turning")
 
 
 @dataclass(frozen=True)
@@ -138,19 +131,13 @@ class Shapes:
 
     def take(self, chosen: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Shapes:
         """The movements that an index array, a mask or a slice chooses, in its order."""
-        return Shapes(
-            **{name: np.ascontiguousarray(array[chosen]) for name, array in self.arrays().items()},
-            elastic=self.elastic,
-            cloud=self.cloud,
-        )
+        arrays: dict[str, Any] = {name: np.ascontiguousarray(array[chosen]) for name, array in self.arrays().items()}
+        return replace(self, **arrays)
 
     def empty(self, n: int) -> Shapes:
         """Uninitialized arrays for n movements with the same dimensions and specifications, to be filled."""
-        return Shapes(
-            **{name: np.empty((n, *array.shape[1:]), np.float32) for name, array in self.arrays().items()},
-            elastic=self.elastic,
-            cloud=self.cloud,
-        )
+        rooms: dict[str, Any] = {name: np.empty((n, *x.shape[1:]), np.float32) for name, x in self.arrays().items()}
+        return replace(self, **rooms)
 
     def put(self, start: int, others: Shapes) -> None:
         """Write other movements over those from `start` on."""
@@ -160,9 +147,7 @@ class Shapes:
 
     def arrays(self) -> dict[str, Floats]:
         """The arrays by name."""
-        return {
-            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("elastic", "cloud")
-        }
+        return {name: getattr(self, name) for name in _ARRAYS}
 
 
 def shapes_of(
@@ -176,11 +161,14 @@ def shapes_of(
     turning angles 0, so that the elastic distance is dynamic time warping of values and of slopes.
     """
     n, d, n_positions = paths.shape
-    shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
+    elastic, cloud = elastic or ElasticSpec(), cloud or CloudSpec()
+    segments, points = (
+        (np.empty((n, k, d), np.float32), np.empty((n, k, d), np.float32), np.empty((n, k), np.float32))
+        for k in (elastic.n_segments, cloud.n_points)
+    )
+    shapes = Shapes(*segments, *points, elastic, cloud)
     if use_compiled(_CALL_OPERATIONS + n * _PATH_OPERATIONS):
         ends, even = _between(n_positions, shapes.elastic.n_segments + 1), _between(n_positions, shapes.cloud.n_points)
-        segments = (shapes.tangents, shapes.midpoints, shapes.turning)
-        points = (shapes.points, shapes.point_tangents, shapes.point_turning)
         fill = compiled_module("kineme.kernels._shapes").fill_shapes
         fill(np.ascontiguousarray(paths), _NO_LENGTH, (ends, even), segments, points)
     else:
@@ -191,20 +179,6 @@ def shapes_of(
         shapes.tangents[:] = steps / np.where(sizes > 0, sizes, 1.0)
         shapes.turning[:] = 0
     return shapes
-
-
-def _room(n: int, d: int, elastic: ElasticSpec, cloud: CloudSpec) -> Shapes:
-    segments, points = (n, elastic.n_segments), (n, cloud.n_points)
-    return Shapes(
-        tangents=np.empty((*segments, d), np.float32),
-        midpoints=np.empty((*segments, d), np.float32),
-        turning=np.empty(segments, np.float32),
-        points=np.empty((*points, d), np.float32),
-        point_tangents=np.empty((*points, d), np.float32),
-        point_turning=np.empty(points, np.float32),
-        elastic=elastic,
-        cloud=cloud,
-    )
 
 
 def _fill_shapes(paths: Array, shapes: Shapes) -> None:
@@ -249,10 +223,7 @@ def _angles(a: Array, b: Array) -> Array:
 
 
 def elastic_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
-    """Squared elastic and turning distances (2, k) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
-
-    `first`, `second` (k,); `rotations` (k, d, d).
-    """
+    """Squared elastic and turning distances (2, k) of k pairs: A's movement ``first[i]`` and B's ``second[i]``."""
     sums = [_warped(costs, A.elastic.band) for costs in _costs(A, B, first, second, rotations)]
     return np.stack(sums) / A.elastic.n_segments
 
@@ -297,10 +268,7 @@ def _warped(costs: Array, band: int) -> Array:
 
 
 def cloud_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: Array | None) -> Array:
-    """Squared distances (k,) of k pairs: A's movement ``first[i]`` and B's ``second[i]``.
-
-    `first`, `second` (k,); `rotations` (k, d, d).
-    """
+    """Squared distances (k,) of the point clouds of k pairs, as `elastic_squares`."""
     x, y = A.points[first].astype(float), rotated(B.points[second], rotations)
     t, u = A.point_tangents[first].astype(float), rotated(B.point_tangents[second], rotations)
     angles = A.point_turning[first, :, None].astype(float) - B.point_turning[second, None, :]
@@ -334,22 +302,16 @@ _TILE_BOUNDS = 32_768
 _LANES = 16  # pairs that the compiled loops compare at once
 _LISTED = 1.2  # time of 16 pairs taken from a list, by that of 16 of one movement with others
 _TWIN_PAIRS = 1000
-_BOUND_EVERY = (
-    3  # of how many segments one is compared for a bound: of handwriting as recorded, that leaves one pair in ten
-)
+_BOUND_EVERY = 3  # of so many segments one is compared for a bound: of handwriting, that leaves one pair in ten
 _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 
 
 def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Squared distances (3, n, m) of every movement of A with every one of B: elastic, turning, point cloud.
 
-    - `A`, `B`: n and m movements with the same dimensions d and specifications.
-    - `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
-      onto A's, float32 fastest; of points in the plane or in space, J after each other, those of one, which rotate
-      all. By default nothing is rotated.
-
-    In units of the movements' squared size. The turning distance does not depend on the rotation.
-    Raises `SpecificationError`: dimensions, specifications or the shape of the rotations do not fit.
+    `rotations` (n, m, d, d) or, in the plane, (n, m, 2): matrices R, or cosines and sines, that rotate B's movement
+    onto A's, float32 fastest; of points in the plane or in space, J after each other, those of one, which rotate all.
+    By default nothing is rotated. Distances are in units of the movements' squared size.
     """
     return _grid(A, B, rotations, (_fill_compiled, _fill_plain), _TILE_PAIRS)
 
@@ -359,17 +321,14 @@ def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None, *, 
 
     That of the point cloud is the distance itself, or 0 without `clouds`: then all take a quarter of the time.
     """
-    fillers = (lambda *tile: _bound_compiled(*tile, clouds=clouds), lambda *tile: _bound_plain(*tile, clouds=clouds))
+    fillers = (partial(_bound_compiled, clouds=clouds), partial(_fill_plain, clouds=clouds))
     return _grid(A, B, rotations, fillers, _TILE_BOUNDS)
 
 
 def listed_distances(
     A: Shapes, B: Shapes, first: NDArray[np.intp], second: NDArray[np.intp], rotations: NDArray[Any] | None = None
 ) -> Floats:
-    """Of k pairs, A's movement ``first[i]`` and B's ``second[i]``, what `pair_distances` gives: (3, k).
-
-    Rotations are (k, d, d) or, in the plane, (k, 2).
-    """
+    """Distances (3, k) as `pair_distances` of k pairs, A's ``first[i]`` and B's ``second[i]``, rotations (k, ...)."""
     _check(A, B)
     k = len(first)
     entries = np.empty((k, 1, 0), np.float32)
@@ -441,57 +400,45 @@ def _check_rotations(rotations: NDArray[Any], shape: tuple[int, ...], d: int) ->
 
 
 def _fill_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
-    """Write the squared distances (3, n, m) of a tile of pairs, with entries (n, m, r) of their rotations.
-
-    r is d^2, or 2 for cosine and sine, or 0 for no rotation.
-    """
+    """Write the squared distances (3, n, m) of a tile of pairs, with entries (n, m, r) of rotations; r 0 for none."""
     n, m = squares.shape[1:]
     module, numbers = compiled_module("kineme.kernels._pairs"), _numbers(A.elastic, A.cloud)
-    sides = (_arrays(A, tile[0]), _arrays(B, tile[1]))
+    a, b = _arrays(A, tile[0]), _arrays(B, tile[1])
     # Always contiguous, so that one version is compiled.
     result = squares if squares.flags.c_contiguous else np.empty(squares.shape, np.float32)
     by_columns, by_rows, listed = n * -(-m // _LANES), m * -(-n // _LANES), _LISTED * -(-n * m // _LANES)
-    if by_columns <= min(by_rows, listed):
-        module.fill_grid((0,) * A.n_dims, sides, numbers, entries, result)
-    elif by_rows <= listed:
-        module.fill_by_rows((0,) * A.n_dims, sides, numbers, entries, result)
+    if min(by_columns, by_rows) <= listed:
+        rows_first = by_rows < by_columns
+        module.fill_grid((0,) * A.n_dims, (a, b) if rows_first else (b, a), rows_first, numbers, entries, result)
     else:
         pairs = np.divmod(np.arange(n * m), m)
         entries = entries.reshape(n * m, 1, -1) if entries.size else np.empty((n * m, 1, 0), np.float32)
-        module.fill_listed((0,) * A.n_dims, sides, pairs, numbers, entries, result.reshape(3, -1))
+        module.fill_listed((0,) * A.n_dims, (a, b), pairs, numbers, entries, result.reshape(3, -1))
     if result is not squares:
         squares[:] = result
 
 
-def _fill_plain(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats) -> None:
-    """The same by the plain definitions."""
-    pairs, entries = _listed(tile, entries)
-    result = np.empty((3, len(pairs[0])), np.float32)
-    _fill_listed_plain(A, B, pairs, entries, result)
+def _fill_plain(
+    A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats, *, clouds: bool | None = None
+) -> None:
+    """The same by the plain definitions; bounds where it is said whether those of clouds are among them."""
+    n, m, r = entries.shape
+    first, second = np.divmod(np.arange(n * m), m)
+    pairs, result = (first + tile[0].start, second + tile[1].start), np.empty((3, n * m), np.float32)
+    _fill_listed_plain(A, B, pairs, entries.reshape(n * m, 1, r), result, clouds)
     squares[:] = result.reshape(squares.shape)
 
 
-def _listed(tile: Tile, entries: Floats) -> tuple[Pairs, Floats]:
-    """The pairs of a tile one by one, and the entries (k, 1, r) of their rotations."""
-    n, m = entries.shape[:2]
-    first, second = np.divmod(np.arange(n * m), m)
-    return (first + tile[0].start, second + tile[1].start), entries.reshape(n * m, 1, entries.shape[2])
-
-
-def _fill_listed_plain(A: Shapes, B: Shapes, pairs: Pairs, entries: Floats, squares: Floats) -> None:
-    """Write the squared distances (3, k) of listed pairs."""
-    for part, R in _parts(entries, A.n_dims):
-        chosen = (pairs[0][part], pairs[1][part])
-        squares[:2, part] = elastic_squares(A, B, *chosen, R)
-        squares[2, part] = cloud_squares(A, B, *chosen, R)
-
-
-def _parts(entries: Floats, d: int) -> Iterator[tuple[slice, Array | None]]:
-    """Slices of the pairs, as many as are compared at once, with their matrices."""
-    matrices = _matrices(entries, d)
+def _fill_listed_plain(
+    A: Shapes, B: Shapes, pairs: Pairs, entries: Floats, squares: Floats, clouds: bool | None = None
+) -> None:
+    """Write the squared distances (3, k) of listed pairs, or their bounds."""
+    matrices = _matrices(entries, A.n_dims)
     for start in range(0, len(entries), _TWIN_PAIRS):
         part = slice(start, start + _TWIN_PAIRS)
-        yield part, None if matrices is None else matrices[part]
+        listed = (A, B, pairs[0][part], pairs[1][part], None if matrices is None else matrices[part])
+        squares[:2, part] = elastic_squares(*listed) if clouds is None else elastic_bounds(*listed, _BOUND_EVERY)
+        squares[2, part] = 0.0 if clouds is False else cloud_squares(*listed)
 
 
 def _bound_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats, *, clouds: bool) -> None:
@@ -501,18 +448,6 @@ def _bound_compiled(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: 
     module.fill_bounds((0,) * A.n_dims, sides, _numbers(A.elastic, A.cloud), entries, _BOUND_EVERY, result)
     squares[2] = 0
     squares[: len(result)] = result
-
-
-def _bound_plain(A: Shapes, B: Shapes, tile: Tile, entries: Floats, squares: Floats, *, clouds: bool) -> None:
-    """The same by the plain definition."""
-    shape, (pairs, entries) = squares.shape[1:], _listed(tile, entries)
-    result = np.zeros((3, len(entries)), np.float32)
-    for part, R in _parts(entries, A.n_dims):
-        chosen = (pairs[0][part], pairs[1][part])
-        result[:2, part] = elastic_bounds(A, B, *chosen, R, _BOUND_EVERY)
-        if clouds:
-            result[2, part] = cloud_squares(A, B, *chosen, R)
-    squares[:] = result.reshape(3, *shape)
 
 
 def _matrices(entries: Floats, d: int) -> Array | None:

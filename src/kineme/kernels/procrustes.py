@@ -21,7 +21,6 @@ from kineme.kernels.rotation import (
     soft_products,
     soft_products_in_plane,
     soft_rotations,
-    turned,
 )
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles, single_threaded_blas
@@ -121,10 +120,7 @@ class Procrustes:
         return np.asarray(mixture.reshape(n, -1, samples) / np.where(sizes > 0, sizes, 1.0)[:, None, None])
 
     def prepare(self, rows: Array) -> Prepared:
-        """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once.
-
-        The products run in the rows' own precision, float64 or float32; the norms are float64.
-        """
+        """Rows (n, d * S) as comparisons need them, in their own precision; so stored movements are converted once."""
         rows = self.by_coordinates(rows)
         in_plane = self.n_dims == 2 and self.max_angle > 0
         return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
@@ -150,11 +146,9 @@ class Procrustes:
         return _in_space(A, B, filler(len(A.rows) * len(B.rows)))[0]
 
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
-        """The same, and the rotations that bring B closest to A.
+        """The same, and rotations of B onto A: (n, m, 2), cosine and sine, in the plane, (n, m, 3, 3) in space.
 
         Under a limit in space, these are the best free rotations, turned back to the limit.
-
-        Returns `alignment` (n, m); `rotations` (n, m, 2) with cosine and sine in the plane, (n, m, 3, 3) in space.
         """
         if self.max_angle == 0 or self.n_dims not in (2, 3):
             return self.alignment(A, B), None
@@ -186,21 +180,16 @@ class Procrustes:
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
         A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
-        d = self.n_dims
-        if self.max_angle == 0 or d not in (2, 3):
+        if self.max_angle == 0 or self.n_dims not in (2, 3):
             return np.broadcast_to(np.eye(self.n_columns), (len(B), self.n_columns, self.n_columns)).copy()
-        return blocks(self._rotations(self.by_coordinates(A), self.by_coordinates(B)), self.n_points)
-
-    def _rotations(self, A: Array, B: Array) -> Array:
-        """The same of one point, rows with the x of all points first."""
-        d = self.n_dims
-        if d == 2:
+        A, B = self.by_coordinates(A), self.by_coordinates(B)
+        if self.n_dims == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
-            return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
-        C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        return best_rotations(C, self.max_angle)
+            return blocks(np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), self.n_points)
+        C = A.reshape(len(A), 3, -1) @ B.reshape(len(B), 3, -1).transpose(0, 2, 1)
+        return blocks(best_rotations(C, self.max_angle), self.n_points)
 
     def _soft_in_plane(self, A: Prepared, B: Prepared, rotations: bool) -> tuple[Array, NDArray[np.float32] | None]:
         """Best products (n, m) under the prior, and cosines and sines (n, m, 2)."""
@@ -237,7 +226,7 @@ class Procrustes:
 
         def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
             norms = (a[:, None] * b).ravel()
-            M = turned(_covariances(products), norms, F)
+            M = np.asarray(_covariances(products) + norms[:, None, None] * F)
             best[:] = (soft_products(M) - norms * np.trace(F)).reshape(best.shape)
             if rotations:
                 R[:] = soft_rotations(M).reshape(R.shape)

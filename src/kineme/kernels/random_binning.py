@@ -75,10 +75,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
         """Draw the grids and count their bins.
 
-        Raises
-        ------
-        SpecificationError
-            A parameter out of its range, or too many bins for the memory of a linear model.
+        Raises `SpecificationError`: a parameter out of its range, or too many bins for the memory of a linear model.
         """
         rows = _rows(X)
         check_number("sigma", self.sigma, above=0.0)
@@ -107,10 +104,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     def transform(self, X: ArrayLike) -> csr_array:
         """Features Z, a `scipy.sparse.csr_array` of shape (n, n_columns_).
 
-        Raises
-        ------
-        SpecificationError
-            Another number of columns than in `fit`.
+        Raises `SpecificationError`: another number of columns than in `fit`.
         """
         from scipy.sparse import csr_array, diags_array, hstack
 

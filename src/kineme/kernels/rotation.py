@@ -79,10 +79,7 @@ class _Form(NamedTuple):
 
 
 def best_products(C: Array, max_angle: float) -> Array:
-    """Largest ``tr(R^T C)`` (n,) over rotations by at most `max_angle`, for covariances C (n, 3, 3).
-
-    NaN where a covariance is not finite.
-    """
+    """Largest ``tr(R^T C)`` (n,) over rotations by at most `max_angle`, for C (n, 3, 3); NaN where C is not finite."""
     form = _form(C)
     c, s = half_angle(max_angle)
     step, inside = _solve(form, form.trace, c, s)
@@ -225,20 +222,13 @@ class RotationPrior:
     tilt: float = 0.5
 
     def __post_init__(self) -> None:
-        if self.concentration is not None:
-            check_number("concentration", self.concentration, least=0.0)
+        check_number("concentration", self.concentration, least=0.0, optional=True)
         check_number("tilt", self.tilt, least=0.0)
         if self.vertical is not None:
             object.__setattr__(self, "vertical", _direction(self.vertical))
 
     def matrix(self, n_dims: int) -> Array:
-        """F, (n_dims, n_dims).
-
-        Raises
-        ------
-        SpecificationError
-            A vertical for movements that are not in space.
-        """
+        """F, (n_dims, n_dims). Raises `SpecificationError`: a vertical for movements that are not in space."""
         free = n_dims if self.vertical is None else 2  # about a vertical, movements are rotated as in the plane
         k = CONCENTRATION.get(free, 0.0) if self.concentration is None else self.concentration
         F = k * np.eye(n_dims)
@@ -340,11 +330,6 @@ def _largest_root(square: Array, determinant: Array, last: Array) -> Array:
         if not (step > CONVERGED * x).any():
             break
     return np.asarray(x)
-
-
-def turned(C: NDArray[np.floating], weight: Array, F: Array) -> Array:
-    """``C + |a| |b| F`` for covariances C (n, 3, 3)."""
-    return np.asarray(C + weight[:, None, None] * F)
 
 
 def blocks(R: Array, n_points: int) -> Array:

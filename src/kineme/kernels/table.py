@@ -83,17 +83,7 @@ _MOST_DIMS = 10_000
 
 @dataclass(frozen=True)
 class Averaged(Kernel):
-    """An A-average of per-dimension similarities; made by `averaged`.
-
-    Parameters
-    ----------
-    kernel : Kernel or tuple of n_dims kernels
-        One for all dimensions, or one for each. A width of None is chosen per dimension.
-    n_dims : int
-        The columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
-    mean : str
-        A key of `MEANS`, which says what is proved about positive semi-definiteness.
-    """
+    """An A-average of per-dimension similarities; made by `averaged`, whose parameters are its fields."""
 
     kernel: Kernel | tuple[Kernel, ...]
     n_dims: int
@@ -179,8 +169,9 @@ def averaged(kernel: Kernel | tuple[Kernel, ...], n_dims: int, mean: str = "arit
     Parameters
     ----------
     kernel : Kernel or tuple of n_dims kernels
+        One for all dimensions, or one for each. A width of None is chosen per dimension.
     n_dims : int
-        Dimensions of the movements: the columns are that many equal blocks, Eq. (9).
+        Dimensions of the movements: the columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}
         Arithmetic keeps positive semi-definiteness always, geometric that of infinitely divisible
         kernels (`RBF`, `Laplacian`); of the others nothing is claimed. See `MEANS`.
@@ -225,23 +216,16 @@ TileSums = Callable[[Rows, Rows, Any, Rows], None]
 
 @dataclass(frozen=True)
 class Term:
-    """The term that one coordinate adds to the sum: g(d(x, y)), with one constant c.
-
-    `load_compiled`: returns the compiled loop; called only if it is used, because it imports Numba.
-    """
+    """The term that one coordinate adds to the sum: g(d(x, y)), with one constant c."""
 
     twin: Callable[[Rows, Rows, Any], Any]  # the definition, ``twin(x, y, c)`` over arrays
-    load_compiled: Callable[[], TileSums]
+    load_compiled: Callable[[], TileSums]  # the compiled loop; called only if it is used, because it imports Numba
     cost: int = 4  # elementary operations of NumPy per evaluation of the twin
     symmetric: bool = True  # whether term(x, y) always equals term(y, x)
 
 
 def _builtin(name: str) -> Callable[[], TileSums]:
-    def load() -> TileSums:
-        loop: TileSums = getattr(compiled_module("kineme.kernels._compiled"), name)
-        return loop
-
-    return load
+    return lambda: getattr(compiled_module("kineme.kernels._compiled"), name)
 
 
 def _canberra(x: Rows, y: Rows, _c: Any) -> Rows:
@@ -256,13 +240,7 @@ CANBERRA = Term(_canberra, _builtin("canberra_sums"), cost=8)
 
 
 def fill_gram(term: Term, c: float, finish: Callable[[Rows], object], A: Rows, B: Rows | None, gram: Rows) -> None:
-    """Write h(sums of `term` over coordinates) to `gram`, tile by tile, in threads.
-
-    - `c`: the constant of the term.
-    - `finish`: h of Eq. (5): changes a tile of sums in place.
-    - `A`, `B` (n_A, p), (n_B, p).
-    - `gram` (n_A, n_B).
-    """
+    """Write h(sums of `term` over coordinates) to `gram`, in threads; `finish`, h of Eq. (5), works in place."""
     mirrored = B is None and term.symmetric
     A = contiguous(A, A.dtype)
     columns = A if B is None else contiguous(B, A.dtype)
@@ -299,11 +277,7 @@ def tile_sums_of(term: Term, n_terms: int) -> TileSums:
 
 
 def _median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
-    """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
-
-    Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
-    left out: copies of a row say nothing about the distances between different rows.
-    """
+    """Median over pairs of different rows, of at most 1000 evenly spaced ones, of finish(sum of `term`)."""
     rows = _some_rows(X, _MAX_ROWS)
     sums = np.empty((len(rows), len(rows)))
     fill_gram(term, 0.0, finish, rows, None, sums)
@@ -360,12 +334,29 @@ class TruncatedEuclidean(Kernel):
         assert self.m is not None
         m, slope = A.dtype.type(self.m), A.dtype.type(-1 / (A.shape[1] * self.sigma))
 
-        def similarity(tile: Rows) -> None:
-            tile *= slope
-            tile += m
-            np.maximum(tile, 0, out=tile)  # rounding only
+        fill_gram(TRUNCATED, self.m * min(1.0, self.sigma), _falling_from(m, slope), A, B, gram)
 
-        fill_gram(TRUNCATED, self.m * min(1.0, self.sigma), similarity, A, B, gram)
+
+def _falling_from(top: Any, slope: Any) -> Callable[[Rows], None]:
+    """Return what changes sums to ``max(0, top + slope sums)`` in place."""
+
+    def similarity(tile: Rows) -> None:
+        tile *= slope
+        tile += top
+        np.maximum(tile, 0, out=tile)  # rounding only
+
+    return similarity
+
+
+def _exponential(slope: Any) -> Callable[[Rows], None]:
+    """Return what changes sums to ``exp(slope sums)`` in place."""
+
+    def similarity(tile: Rows) -> None:
+        with np.errstate(over="ignore"):  # exp(-inf) = 0 is right
+            tile *= slope
+        np.exp(tile, out=tile)
+
+    return similarity
 
 
 # Elements of the Gram matrix that stay in cache between the passes over them.
@@ -408,14 +399,7 @@ class RBF(Kernel):
         if max(a2.max(), b2.max()) * float(np.finfo(A.dtype).eps) ** 0.25 <= 1:
             _exp_of_product(a, b, a2, b2, gram)
         else:
-            slope = A.dtype.type(-0.5 / self.sigma**2)
-
-            def similarity(tile: Rows) -> None:
-                with np.errstate(over="ignore"):  # exp(-inf) = 0 is right
-                    tile *= slope
-                np.exp(tile, out=tile)
-
-            fill_gram(SQUARED, 0.0, similarity, A, B, gram)
+            fill_gram(SQUARED, 0.0, _exponential(A.dtype.type(-0.5 / self.sigma**2)), A, B, gram)
         if B is None:
             np.fill_diagonal(gram, 1)
 
@@ -457,14 +441,7 @@ class Laplacian(Kernel):
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         assert self.sigma is not None
-        slope = A.dtype.type(-1 / self.sigma)
-
-        def similarity(tile: Rows) -> None:
-            with np.errstate(over="ignore"):  # exp(-inf) = 0 is right
-                tile *= slope
-            np.exp(tile, out=tile)
-
-        fill_gram(ABSOLUTE, 0.0, similarity, A, B, gram)
+        fill_gram(ABSOLUTE, 0.0, _exponential(A.dtype.type(-1 / self.sigma)), A, B, gram)
 
 
 @dataclass(frozen=True)
@@ -482,26 +459,16 @@ class Canberra(Kernel):
     """
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
-        slope = A.dtype.type(-1 / A.shape[1])
-
-        def similarity(tile: Rows) -> None:
-            tile *= slope
-            tile += 1
-            np.maximum(tile, 0, out=tile)  # rounding only
-
-        fill_gram(CANBERRA, 0.0, similarity, A, B, gram)
+        fill_gram(CANBERRA, 0.0, _falling_from(1, A.dtype.type(-1 / A.shape[1])), A, B, gram)
 
 
 @dataclass(frozen=True)
 class KernelRow:
-    """One kernel that can be built from its name.
-
-    `formula`, `equation`: equation number of the paper, empty where the paper has none.
-    """
+    """One kernel that can be built from its name."""
 
     kernel: type[Kernel]  # called without arguments it takes its widths from the data
     formula: str
-    equation: str
+    equation: str  # number in the paper, empty where the paper has none
     psd: bool  # whether it is proved positive semi-definite for all its parameters
     infinitely_divisible: bool  # whether its powers k^t, t > 0, are proved so too
 

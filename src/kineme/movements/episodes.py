@@ -55,11 +55,10 @@ class Episode:
 
 
 def default_features(widths: Mapping[str, int]) -> tuple[str, ...]:
-    """Return the features that say how an arm moved, where nobody chooses; none if that is not clear.
+    """Return the features that say how an arm moved, where nobody chooses, of all with their widths; none if unclear.
 
     That is ``observation.state``; else all observed positions of joints, tips and grippers, as robomimic and UMI name
-    them; else the only one of several numbers, such as ``action``; else the only one. `widths`: feature -> how many
-    numbers it has.
+    them; else the only one of several numbers, such as ``action``; else the only one.
     """
     positions = tuple(name for name in widths if _POSITIONS.fullmatch(name))
     vectors = tuple(name for name, width in widths.items() if width > 1) or tuple(widths)

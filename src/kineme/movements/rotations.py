@@ -122,10 +122,15 @@ def continuous(q: ArrayLike) -> Array:
     q = as_quaternions(q)
     if q.ndim < 2:
         raise TrajectoryError(f"expected quaternions along time, of shape (..., T, 4), got shape {q.shape}")
-    flips = (q[..., 1:, :] * q[..., :-1, :]).sum(axis=-1) < 0
-    odd = np.zeros(q.shape[:-1], dtype=bool)
+    return np.where(odd_flips(q)[..., None], -q, q)
+
+
+def odd_flips(vectors: Array) -> NDArray[np.bool_]:
+    """Tell whether vectors (..., T, k) turned to the opposite side an odd number of times, until each: (..., T)."""
+    odd = np.zeros(vectors.shape[:-1], dtype=bool)
+    flips = (vectors[..., 1:, :] * vectors[..., :-1, :]).sum(axis=-1) < 0
     np.logical_xor.accumulate(flips, axis=-1, out=odd[..., 1:])
-    return np.where(odd[..., None], -q, q)
+    return odd
 
 
 def angle_between(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:

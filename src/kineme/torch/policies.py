@@ -124,6 +124,7 @@ class Trajectories:
 
     def __init__(self, primitive: Primitive, low: float = -torch.inf, high: float = torch.inf) -> None:
         self._given = self._primitive = primitive
+        self._n_params = primitive.dims * (primitive.dmp.n_basis + 1)
         self._bounds = (low, high)
         self.reset()
 
@@ -139,9 +140,8 @@ class Trajectories:
         Raises `TrajectoryError`: another number of them.
         """
         self._params = self._tensor(params)
-        expected = self._given.dims * (self._given.dmp.n_basis + 1)
-        if self._params.shape[-1] != expected:
-            raise TrajectoryError(f"expected {expected} parameters, got {self._params.shape[-1]}")
+        if self._params.shape[-1] != self._n_params:
+            raise TrajectoryError(f"expected {self._n_params} parameters, got {self._params.shape[-1]}")
 
     def set_initial_conditions(self, init_time: Any, init_pos: Any, init_vel: Any) -> None:
         """Set the state (..., d) from which the movement goes on at a time [s], the same for all of a batch.
@@ -168,8 +168,7 @@ class Trajectories:
 
     def get_params_bounds(self) -> Tensor:
         """Lower and upper bounds (2, d (N + 1))."""
-        bounds = self._tensor(self._bounds)[:, None]
-        return bounds.expand(2, self._given.dims * (self._given.dmp.n_basis + 1)).clone()
+        return self._tensor(self._bounds)[:, None].expand(2, self._n_params).clone()
 
     def _tensor(self, values: Any) -> Tensor:
         like = self._given.decode_matrix

@@ -204,8 +204,7 @@ class Primitive(torch.nn.Module):
 
         Raises `SpecificationError`: a rate too low to follow the dynamics; a duration of 0 or less.
         """
-        if duration is not None:
-            check_number("duration", duration, above=0.0)
+        check_number("duration", duration, above=0.0, optional=True)
         seconds = self.duration.cpu().numpy() if duration is None else np.array(float(duration))
         learned = {name: value for name in _LEARNED if (value := getattr(self, name)) is not None}
         if duration is not None and learned:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kineme.dmp.control.plan import MovingGoal, ObstacleAvoidance, Status, steering
-from kineme.dmp.discrete.modulate import plan_of
 
 
 def test_how_strongly_obstacles_turn_a_movement_by_default():
@@ -40,7 +39,7 @@ def test_a_movement_has_settled_within_a_thousandth_of_its_extent(bio):
 @pytest.mark.parametrize("dt", [0.02, 0.3])
 def test_of_a_filtered_goal_the_mean_over_the_step_acts(bio, dt):
     """On the way to a new target by ``filter dg/dt = target - g``."""
-    plan = plan_of(bio)
+    plan = bio.controller(dt=0.01)._plan
     old = bio.goals[0] - bio.starts[0]
     goal = MovingGoal(plan, old, 0.2)
     goal.aim(old + 1.0)

@@ -325,11 +325,9 @@ class Options:
                 'expected phase_stopping together with feedback="phase", and only then, got '
                 f"feedback={self.feedback!r} and phase_stopping={self.phase_stopping!r}"
             )
-        if self.phase_stopping is not None:
-            check_number("phase_stopping", self.phase_stopping, least=0.0)
+        check_number("phase_stopping", self.phase_stopping, least=0.0, optional=True)
         for name in ("goal_filter", "settle"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), above=0.0)
+            check_number(name, getattr(self, name), above=0.0, optional=True)
         if self.avoidance is not None and not isinstance(self.avoidance, ObstacleAvoidance):
             raise SpecificationError(f"expected avoidance to be an ObstacleAvoidance, got {self.avoidance!r}")
 
@@ -405,8 +403,7 @@ class ObstacleAvoidance:
     def __post_init__(self) -> None:
         check_number("gamma", self.gamma, least=0.0)
         check_number("beta", self.beta, least=0.0)
-        if self.reach is not None:
-            check_number("reach", self.reach, above=0.0)
+        check_number("reach", self.reach, above=0.0, optional=True)
 
     @property
     def fading(self) -> float:

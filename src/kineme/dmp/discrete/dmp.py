@@ -14,7 +14,7 @@ from kineme.dmp.discrete.operators import forcing_matrix
 from kineme.dmp.discrete.specification import Specification, safe_amplitudes
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import SpecificationError
-from kineme.validation import Array, check_count, check_samples
+from kineme.validation import Array, check_count, check_number, check_samples
 
 if TYPE_CHECKING:
     from kineme.dmp.control.controller import Controller
@@ -368,13 +368,19 @@ class Primitives(Batch):
         0.002
         """
         from kineme.dmp.control.controller import Controller  # these load where a robot moves, not to learn
-        from kineme.dmp.control.plan import Options
-        from kineme.dmp.discrete.modulate import plan_of
+        from kineme.dmp.control.plan import Options, check_one, one_vector
+        from kineme.dmp.discrete.modulate import modulated, plan_along
+        from kineme.dmp.discrete.rollout import rollout
+        from kineme.dmp.discrete.via_points import via_points
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
-        return Controller(
-            plan_of(self, start, goal, duration, velocity, via, end_velocity, position_limits), dt, options
-        )
+        check_one(len(self))
+        check_number("duration", duration, above=0.0, optional=True)
+        vectors = {"start": start, "goal": goal, "velocity": velocity, "end_velocity": end_velocity}
+        x0, g, v0, end = (one_vector(name, vector, self.n_dims) for name, vector in vectors.items())
+        targets = None if via is None else via_points(via, self.n_dims)
+        movement = modulated(rollout(self, x0, g, duration, v0), targets, end, position_limits)
+        return Controller(plan_along(movement, self.n_dims, targets), dt, options)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

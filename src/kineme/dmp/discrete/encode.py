@@ -1,13 +1,9 @@
 """Learn a batch of movements: resample, subtract the start, multiply by the encode matrix.
 
-The number of basis functions and the ridge are chosen by generalized cross-validation, G. H. Golub, M. Heath and G.
-Wahba, Technometrics 21(2), 1979, Eq. (1.4). With H the matrix from the T samples of a path to the fitted ones,
-
-    GCV = mean (y - H y)^2 / (1 - trace(H) / T)^2.
-
-For one N, H of every ridge comes from one decomposition: with A the columns that the path is fitted with and B the
-second differences of the weights, ``[A; B] = [Q1; Q2] R`` and ``Q1 = U C Z'``, ``H = U C^2 (C^2 + ridge S^2)^-1 U'``,
-where S^2 are the squared lengths of the columns of ``Q2 Z``.
+For generalized cross-validation (G. H. Golub, M. Heath and G. Wahba, Technometrics 21(2), 1979, Eq. (1.4), see
+`DMP.choose`) the matrices H of all ridges come from one decomposition: with A the columns that the path is fitted with
+and B the second differences of the weights, ``[A; B] = [Q1; Q2] R`` and ``Q1 = U C Z'``,
+``H = U C^2 (C^2 + ridge S^2)^-1 U'``, where S^2 are the squared lengths of the columns of ``Q2 Z``.
 """
 
 from __future__ import annotations

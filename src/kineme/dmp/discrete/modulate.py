@@ -32,14 +32,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from kineme.dmp.batch import Batch
-from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
-from kineme.dmp.discrete.operators import condition, decoder, decoder_at, smoothness_factor
-from kineme.dmp.discrete.rollout import Change, Rollout, rollout
+from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one
+from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_at, smoothness_factor
+from kineme.dmp.discrete.rollout import Change, Rollout
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import SHARES, Span, ViaLike, ViaPoints, broadcast_length, per_movement, via_points
 from kineme.errors import ExtrapolationWarning, SpecificationError, warn
-from kineme.validation import Array, as_numbers, check_number
+from kineme.validation import Array, as_numbers
 
 _ROUNDING = 1e-9  # of the extent: so far outside counts as at a limit
 _MISSED = 1e-6  # of the largest position: more than this is outside
@@ -173,7 +172,7 @@ def modulated(
     if via is None and end_velocity is None and position_limits is None:
         return movement
     d = movement.starts.shape[1]
-    targets = via if isinstance(via, ViaPoints) else via_points(() if via is None else via, d)
+    targets = via_points(() if via is None else via, d)
     velocity = per_movement(end_velocity, "end_velocity", d)
     n = broadcast_length(len(movement), {"via": targets.points, "end_velocity": velocity}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
@@ -188,7 +187,7 @@ def modulated(
         change = _smooth_change(movement, targets, observed, errors)
     else:
         change = _shown_change(movement, targets, observed, errors, factor)
-    left = errors - change.coefficients @ (change.directions @ observed.weights.T) if targets.stretch.any() else None
+    left = errors - change.coefficients @ (change.directions @ observed.Phi.T) if targets.stretch.any() else None
     looks = looks_of(movement.primitives.dmp)
     for group in measured:
         warn_changed(extents_of(movement, group), targets, errors, Changed(change, left, looks), group)
@@ -197,40 +196,32 @@ def modulated(
     return (
         movement
         if position_limits is None
-        else within_limits(movement, position_limits, targets.points, observed.weights, SLACK * _stretch(targets))
+        else within_limits(movement, position_limits, targets.points, observed.Phi, SLACK * _stretch(targets))
     )
 
 
 def path_at(movement: Rollout, times: tuple[float, ...]) -> Array:
     """Positions (n, d, k) at any times, as shares of the duration."""
     response = decoder_at(movement.primitives.dmp, times)
-    return _along(movement, _Observed(*(part[0] for part in response))) + movement.starts[:, :, None]
-
-
-class _Observed(NamedTuple):
-    """K linear functions of a movement: its places at the via points, at the end, and the velocity there."""
-
-    weights: Array  # (K, N)
-    goal: Array  # (K,)
-    velocity: Array  # (K,)
-    moving_goal: Array  # (K,)
+    return _along(movement, Response(*(part[0] for part in response))) + movement.starts[:, :, None]
 
 
 @lru_cache(maxsize=32)
-def _observed(dmp: Specification, times: tuple[float, ...]) -> _Observed:
+def _observed(dmp: Specification, times: tuple[float, ...]) -> Response:
+    """K linear functions of a movement, without the first axis: places at the times and the end, the velocity there."""
     response = decoder_at(dmp, (*times, 1.0))
-    return _Observed(*(np.concatenate((part[0], part[1, -1:])) for part in response))
+    return Response(*(np.concatenate((part[0], part[1, -1:])) for part in response))
 
 
 @lru_cache(maxsize=32)
 def _smooth_gain(dmp: Specification, times: tuple[float, ...]) -> Array:
-    return condition(smoothness_factor(dmp), _observed(dmp, times).weights).gain
+    return condition(smoothness_factor(dmp), _observed(dmp, times).Phi).gain
 
 
-def _along(movement: Rollout, observed: _Observed) -> Array:
+def _along(movement: Rollout, observed: Response) -> Array:
     """Evaluate these functions (n, d, K) of the movement relative to its start, before it is changed."""
     own = movement.primitives.row("scaled_weights")
-    values = (own.reshape(-1, own.shape[2]) @ observed.weights.T).reshape(*own.shape[:2], -1)
+    values = (own.reshape(-1, own.shape[2]) @ observed.Phi.T).reshape(*own.shape[:2], -1)
     values = values * movement.ratio[:, :, None]
     values += (movement.goals - movement.starts)[:, :, None] * observed.goal
     values += (movement.velocities_at_start * movement.durations[:, None])[:, :, None] * observed.velocity
@@ -238,26 +229,26 @@ def _along(movement: Rollout, observed: _Observed) -> Array:
     return np.asarray(values)
 
 
-def _smooth_change(movement: Rollout, targets: ViaPoints, observed: _Observed, errors: Array) -> Change:
+def _smooth_change(movement: Rollout, targets: ViaPoints, observed: Response, errors: Array) -> Change:
     """The change with the least mean square acceleration; few coefficients where all points are met."""
     dmp = movement.primitives.dmp
     rows = errors.reshape(-1, errors.shape[2])
     if targets.stretch.any():
-        dense = loose_changes(looks_of(dmp), smoothness_factor(dmp), observed.weights, rows, _stretch(targets))
+        dense = loose_changes(looks_of(dmp), smoothness_factor(dmp), observed.Phi, rows, _stretch(targets))
         return Change(dense.reshape(*errors.shape[:2], -1), np.eye(dmp.n_basis))
     gain = _smooth_gain(dmp, tuple(targets.times.tolist()))
     if not np.isfinite(np.sum(rows)):  # free places follow from the others
-        change = changes(smoothness_factor(dmp), observed.weights, rows, np.zeros(rows.shape[1]))
-        errors = (change @ observed.weights.T).reshape(errors.shape)
+        change = changes(smoothness_factor(dmp), observed.Phi, rows, np.zeros(rows.shape[1]))
+        errors = (change @ observed.Phi.T).reshape(errors.shape)
     return Change(errors, gain)
 
 
-def _shown_change(movement: Rollout, targets: ViaPoints, observed: _Observed, errors: Array, factor: Array) -> Change:
+def _shown_change(movement: Rollout, targets: ViaPoints, observed: Response, errors: Array, factor: Array) -> Change:
     """The change that is likely after the demonstrations' covariance, all dimensions at once."""
     dmp, (n, d, _) = movement.primitives.dmp, errors.shape
     scale = np.where(movement.ratio == 0.0, 1.0, movement.ratio)[:, :, None]  # the deviations scale like the weights
     rows = (errors / scale).reshape(n, -1)
-    every_dim = np.asarray(np.kron(np.eye(d), observed.weights), dtype=np.float64)
+    every_dim = np.asarray(np.kron(np.eye(d), observed.Phi), dtype=np.float64)
     change = loose_changes(looks_of(dmp), mixed_factor(dmp, factor), every_dim, rows, np.tile(_stretch(targets), d))
     return Change(change.reshape(n, d, -1) * scale, np.eye(dmp.n_basis))
 
@@ -268,10 +259,7 @@ def _stretch(targets: ViaPoints) -> Array:
 
 
 def mixed_factor(dmp: Specification, factor: Array) -> Array:
-    """Of the covariance of all weights (d N): r demonstrations' spread, and smoothness that is worth ten of them.
-
-    Smooth changes, which are as large, have the share ``10 / (r + 10)``: demonstrations vary in r directions only.
-    """
+    """Of the covariance of all weights (d N): r demonstrations' spread, and smoothness with the share 10 / (r + 10)."""
     r, d, _ = factor.shape
     share = _WORTH / (r + _WORTH)
     shown = np.sqrt(1.0 - share) * factor.reshape(r, -1)
@@ -309,10 +297,7 @@ def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Arra
 
 
 def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
-    """The same (m, p), of the weights of one or more dimensions of one movement.
-
-    Rows of a stretch, `stretch` (k,) being 1, are met so closely that the path, by `looks` (N, T), does not swing.
-    """
+    """The same (m, p), with rows of a `stretch` (k,) met as closely as the path, by `looks`, does not swing."""
     change = changes(factor, observed, errors, SLACK * stretch)
     if not stretch.any():
         return change
@@ -340,10 +325,7 @@ def looks_of(dmp: Specification) -> Array:
 def within_limits(
     movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array, slack: Array
 ) -> Rollout:
-    """The movement within limits (low, high), with ``held @ W`` (K,) as it is.
-
-    It is held at `points` (1 or n, k, d), with `slack` (K,) as a share of what each deviates under the covariance.
-    """
+    """The movement within limits (low, high), with via points and ``held @ W`` as they are, but for their slack."""
     low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
     rounding = _ROUNDING * movement.primitives.row("extents").max(axis=1)[:, None]  # (1 or n, 1)
@@ -440,33 +422,6 @@ def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tupl
             f"{where[0]} cannot; start more slowly, move the via points inside, or use more basis functions"
         )
     return z
-
-
-def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
-    primitive: Batch,
-    start: ArrayLike | None = None,
-    goal: ArrayLike | None = None,
-    duration: float | None = None,
-    velocity: ArrayLike | None = None,
-    via: ViaLike | None = None,
-    end_velocity: ArrayLike | None = None,
-    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
-) -> Plan:
-    """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
-    check_one(len(primitive))
-    if duration is not None:
-        check_number("duration", duration, above=0.0)
-    d = primitive.n_dims
-    movement = rollout(
-        primitive,
-        one_vector("start", start, d),
-        one_vector("goal", goal, d),
-        duration,
-        one_vector("velocity", velocity, d),
-    )
-    targets = None if via is None else via_points(via, d)
-    movement = modulated(movement, targets, one_vector("end_velocity", end_velocity, d), position_limits)
-    return plan_along(movement, d, targets)
 
 
 def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:

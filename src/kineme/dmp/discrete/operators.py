@@ -241,10 +241,7 @@ class Conditioned(NamedTuple):
 
 
 def condition(factor: Array, observed: Array, deviation: float | Array = 0.0) -> Conditioned:
-    """Condition a Gaussian with covariance ``factor.T @ factor`` on observations of ``observed @ numbers``.
-
-    `factor` (r, p); `observed` (k, p); `deviation` (k,) is that of each observation, in its own unit; 0 is exact.
-    """
+    """Condition a Gaussian, by its factor (r, p), on ``observed @ numbers`` (k,), each with a deviation; 0 is exact."""
     from scipy.linalg import qr  # a larger import than all of learning
 
     whitened = factor @ observed.T  # B (r, k)

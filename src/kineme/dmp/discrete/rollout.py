@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.operators import decoder
 from kineme.dmp.discrete.specification import Specification
-from kineme.dmp.discrete.via_points import broadcast_length, check_durations, per_movement
+from kineme.dmp.discrete.via_points import broadcast_length, check_durations, filled, per_movement
 from kineme.dmp.recorded_as import with_recorded
 from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.movements.channels.channel import Channels, recorded_names
@@ -344,19 +344,14 @@ def rollout(
     options = {name: per_movement(vector, name, d) for name, vector in vectors.items()}
     options["duration"] = per_movement(duration, "duration", None)
     n = broadcast_length(len(primitives), options)
-
-    def fill(name: str, default: Array) -> Array:
-        option = options[name]
-        value = default if option is None else option
-        return np.broadcast_to(value, (n, *value.shape[1:]))
-
-    durations = fill("duration", row("durations"))
+    durations = filled(options["duration"], row("durations"), n)
     check_durations("duration", durations)
-    starts, goals = fill("start", row("starts")), fill("goal", row("goals"))
+    starts, goals = filled(options["start"], row("starts"), n), filled(options["goal"], row("goals"), n)
     # The demonstrated velocity scales with the tempo; a given velocity does not.
     tempo = row("durations") / durations
-    velocities = fill("velocity", row("velocities")) * (tempo[:, None] if options["velocity"] is None else 1.0)
-    moving = None if options["goal_velocity"] is None else fill("goal_velocity", np.zeros((1, d)))
+    velocities = filled(options["velocity"], row("velocities"), n)
+    velocities = velocities * (tempo[:, None] if options["velocity"] is None else 1.0)
+    moving = None if (rate := options["goal_velocity"]) is None else np.broadcast_to(rate, (n, d))
     arrivals = goals if moving is None else goals + moving * durations[:, None]
     ratio = primitives.dmp.system.ratio(arrivals - starts, row("goals") - row("starts"), row("extents"))
     if not np.isfinite(ratio).all():

@@ -46,11 +46,13 @@ class Span(NamedTuple):
 SHARES = Span(1.0, False, _FORM, "{:g} of the duration", _BOUNDS)
 
 
-def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None, span: Span = SHARES) -> ViaPoints:
+def via_points(via: ViaLike | ViaPoints, n_dims: int, learned: Learned | None = None, span: Span = SHARES) -> ViaPoints:
     """Check what a user wrote, points of `n_dims` and times of `span`; see `Primitives.rollout`.
 
     ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are learned, if others.
     """
+    if isinstance(via, ViaPoints):
+        return via
     if isinstance(via, (str, bytes)) or not isinstance(via, (Sequence, np.ndarray)):
         raise SpecificationError(f"expected {span.form}, got {via!r}")
     if len(via) == 2 and _is_time(via[0]):
@@ -168,6 +170,12 @@ def per_movement(option: ArrayLike | None, name: str, n_dims: int | None) -> Arr
             f"expected numbers up to {LARGEST:g} for {name}, got {_first(value, bad)}; choose another unit"
         )
     return value
+
+
+def filled(option: Array | None, default: Array, n: int) -> Array:
+    """An option of n movements, or of one for all of them, as an option of each; `default` where there is none."""
+    value = default if option is None else option
+    return np.broadcast_to(value, (n, *value.shape[1:]))
 
 
 def _first(value: Array, bad: NDArray[np.bool_]) -> str:

@@ -65,7 +65,8 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
         points = [(share, checked_point(learned, point, "a via point")) for share, point in options.via]
         via = tuple((share, point) for share, point in points if point is not None)
         move = _undisturbed if options.obstacles is None else _around_obstacles
-        movement = move(learned.primitive, replace(options, start=start, goal=goal, via=via))
+        duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
+        movement = move(learned.primitive, replace(options, start=start, goal=goal, via=via, duration=duration))
     for name, column in movement.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
@@ -74,10 +75,8 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
             )
     about = learned.primitive.to_recording
     if about is not None:
-        duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
-        movement["positions"] = in_recording(
-            _signed(movement["positions"], learned), about, 0, movement["times"] / duration
-        )
+        shares = movement["times"] / duration
+        movement["positions"] = in_recording(_signed(movement["positions"], learned), about, 0, shares)
         movement |= {name: movement[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
     return Generated(movement, ColumnNames(learned.columns, learned.rates))
 
@@ -147,7 +146,7 @@ def _through(
     """The movement around obstacles that comes nearest to its via points, aimed as far beside them as it missed."""
     n = obstacles.shape[1]
     tolerance = _MET * float(np.ptp(movement["positions"][:, :n], axis=0).max())
-    best, least = movement, _missing(primitive, options, movement, n)
+    best, least = movement, _missing(options, movement, n)
     missing, beside = least, np.zeros_like(least)
     with heard_warnings():  # of what it is aimed at, which nobody asked for
         for _ in range(_AIMED):
@@ -159,7 +158,7 @@ def _through(
                 for (share, point), off in zip(options.via, beside, strict=True)
             )
             movement = _steered(primitive, replace(options, via=aimed), obstacles)
-            missing = _missing(primitive, options, movement, n)
+            missing = _missing(options, movement, n)
             if _largest(missing) < _largest(least):
                 best, least = movement, missing
     for (share, point), off in zip(options.via, np.linalg.norm(least, axis=1), strict=True):
@@ -173,10 +172,10 @@ def _through(
     return best
 
 
-def _missing(primitive: Primitives | PosePrimitives, options: MovementOptions, movement: Columns, n: int) -> Array:
+def _missing(options: MovementOptions, movement: Columns, n: int) -> Array:
     """From the movement to each of the k via points, at its time (k, n)."""
-    duration = float(primitive.durations[0]) if options.duration is None else options.duration
-    at = duration * np.array([share for share, _ in options.via])
+    assert options.duration is not None
+    at = options.duration * np.array([share for share, _ in options.via])
     reached = np.column_stack([np.interp(at, movement["times"], x) for x in movement["positions"][:, :n].T])
     return np.array([point[:n] for _, point in options.via]) - reached
 
@@ -187,13 +186,13 @@ def _largest(missing: Array) -> float:
 
 def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array) -> Columns:
     """The movement under control, with the obstacles where they are."""
-    duration = float(primitive.durations[0]) if options.duration is None else options.duration
-    steps = primitive.rollout(duration=duration, rate=options.rate).times.shape[1] - 1
+    assert options.duration is not None
+    steps = primitive.rollout(duration=options.duration, rate=options.rate).times.shape[1] - 1
     control = primitive.controller(
-        duration / steps,
+        options.duration / steps,
         start=options.start,
         goal=options.goal,
-        duration=duration,
+        duration=options.duration,
         via=options.via or None,
         settle=options.settle,
     )
@@ -208,12 +207,8 @@ def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, o
             f"expected the movement to come within {options.settle:g} of its goal in {_LONGEST:g} durations, the "
             "obstacles keep it away; move them or the goal"
         )
-    return {
-        "times": np.array([state.time for state in states]),
-        "positions": np.array([state.position for state in states]),
-        "velocities": np.array([state.velocity for state in states]),
-        "accelerations": np.array([state.acceleration for state in states]),
-    }
+    names = {"times": "time", "positions": "position", "velocities": "velocity", "accelerations": "acceleration"}
+    return {column: np.array([getattr(state, name) for state in states]) for column, name in names.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.batch import Arrays, Batch, check_array
-from kineme.dmp.control.plan import ObstacleAvoidance, Options, check_one
+from kineme.dmp.control.plan import ObstacleAvoidance, Options
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.modulate import modulated, plan_along
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
@@ -317,10 +317,8 @@ class PosePrimitives(Batch):
         Raises `SpecificationError` or `TrajectoryError`: more than one primitive; an option out of its range; a start
         or goal that is no pose.
         """
-        if duration is not None:
-            check_number("duration", duration, above=0.0)
+        check_number("duration", duration, above=0.0, optional=True)
         movement, references = self._asked_for(start, goal, duration, velocity)
-        check_one(len(movement))
         changes = changes_in_tangent(movement, references, via, end_velocity, position_limits)
         plan = plan_along(modulated(movement, *changes), self.n_positions, changes[0])
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)

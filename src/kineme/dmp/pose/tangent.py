@@ -189,7 +189,7 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     """
     movement = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     last = (offsets[1:] - 1)[movement]
-    odd = _parity((q[1:] * q[:-1]).sum(axis=1) < 0)
+    odd = rotations.odd_flips(q)
     odd = odd ^ odd[last]
     q = np.where(odd[:, None], -q, q)  # along time a double cover: angles run from 0 to 2 pi and come back
     w, v = q[:, :1], q[:, 1:]
@@ -197,7 +197,7 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     axis = _axes(v, length, offsets, movement)
     angle = 2.0 * np.arctan2(length, w)
     # Past 2 pi the axis turns over and the angle decreases: count that as going on.
-    reversed_ = _parity((axis[1:] * axis[:-1]).sum(axis=1) < 0)
+    reversed_ = rotations.odd_flips(axis)
     axis = np.where(reversed_[:, None], -axis, axis)
     signed = np.where(reversed_, -angle[:, 0], angle[:, 0])
     jumps = np.round(np.diff(signed, prepend=signed[0]) / (4.0 * np.pi))
@@ -220,12 +220,6 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
             f"orientation turns by {turned[k]:.3g} rad; split the movement there"
         )
     return p
-
-
-def _parity(flips: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell whether an odd number of flips (total - 1,) lies before each sample, counted through all movements."""
-    odd: NDArray[np.bool_] = np.logical_xor.accumulate(np.concatenate(([False], flips)))
-    return odd
 
 
 def _axes(v: Array, length: Array, offsets: NDArray[np.intp], movement: NDArray[np.intp]) -> Array:

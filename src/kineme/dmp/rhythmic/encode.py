@@ -141,12 +141,10 @@ def fold(
 ) -> tuple[operators.Complex, Array, NDArray[np.intp], Array]:
     """Average over periods by the least-squares Fourier series, then set the phase.
 
-    For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
-    still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
-
-    Of rows (n, d, R) with `cycles` (n,) periods and `lengths` (n,) recorded samples it finds coefficients of `most`
-    harmonics (n, d, H + 1), none above the sampling of a period; where recordings started, in [0, 2 pi); the dimension
-    that set this phase; and the share of the variance that is explained.
+    A fractional number of periods still uses every sample, and its mean is that of whole periods. Of rows (n, d, R),
+    `cycles` (n,) periods and `lengths` (n,) recorded samples it finds coefficients of `most` harmonics (n, d, H + 1),
+    none above the sampling of a period; where recordings started, in [0, 2 pi); the dimension that set this phase; and
+    the share of the variance that is explained.
     """
     n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
@@ -308,14 +306,8 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
 def _newton_step(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> Array:
     """Gauss-Newton step of `cycles` on the residual, the series' own freedom projected out."""
     fit = operators.fit_harmonics(rows, cycles, n_harmonics)
-    position = np.linspace(0.0, 1.0, rows.shape[2])
-    speed = _derivative(fit.coefficients, cycles, position) * position
+    position, h = np.linspace(0.0, 1.0, rows.shape[2]), np.arange(fit.coefficients.shape[2])
+    turns = np.exp(2j * np.pi * cycles[:, None, None] * position * h[:, None])  # (n, H + 1, R)
+    speed = 2 * ((2j * np.pi * h * fit.coefficients) @ turns).real * position  # of the series by `cycles`
     free = speed - operators.fit_harmonics(speed, cycles, n_harmonics).fitted
     return np.asarray(((rows - fit.fitted) * free).sum(axis=(1, 2)) / (free**2).sum(axis=(1, 2)))
-
-
-def _derivative(coefficients: NDArray[np.complex128], cycles: Array, position: Array) -> Array:
-    """Derivative of the series by `cycles`, per share of the recording passed, shape (n, d, R)."""
-    h = np.arange(coefficients.shape[2])
-    turns = np.exp(2j * np.pi * cycles[:, None, None] * position * h[:, None])  # (n, H + 1, R)
-    return np.asarray(2 * ((2j * np.pi * h * coefficients) @ turns).real)

@@ -160,8 +160,7 @@ class RhythmicSpecification(SpringDamper):
     def __post_init__(self) -> None:
         check_choice("aperiodic", self.aperiodic, APERIODIC)
         self._check_spring_damper()
-        if self.period is not None:
-            check_number("period", self.period, above=0.0)
+        check_number("period", self.period, above=0.0, optional=True)
         if self.align_on is not None:
             check_count("align_on", self.align_on, 0)
         _ = self.basis  # checks its own parameters

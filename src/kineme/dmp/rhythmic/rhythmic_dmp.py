@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.batch import Batch
-from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one, one_vector
+from kineme.dmp.control.plan import MISSED, ObstacleAvoidance, Options, Plan, ViaPlaces, check_one, one_vector
 from kineme.dmp.discrete.via_points import ViaLike, via_points
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.rhythmic.encode import encode
@@ -21,7 +21,6 @@ from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
-    from kineme.dmp.control.plan import ObstacleAvoidance
     from kineme.dmp.rhythmic.controller import RhythmicController
 
 _INSTEAD = {
@@ -264,52 +263,42 @@ class RhythmicPrimitives(Batch):
         SpecificationError
             More than one primitive; both `baseline` and `goal`; an option out of its range, or one that rhythms lack.
         """
-        from kineme.dmp.control.plan import Options  # these load where a robot moves, not to learn
-        from kineme.dmp.rhythmic.controller import RhythmicController
+        from kineme.dmp.rhythmic.controller import RhythmicController  # loads where a robot moves, not to learn
 
         refuse_others("controller", others)
         if goal is not None and baseline is not None:
             raise SpecificationError("expected goal or baseline, which are the same, got both; pass one of them")
-        baseline = goal if baseline is None else baseline
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
-        changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
-        plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity}, via)
+        check_one(len(self))
+        d, dmp, weights = self.n_dims, self.dmp, self.scaled_weights[0]
+        vectors = {"baseline": goal if baseline is None else baseline, "start": start, "velocity": velocity}
+        settings: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
+        settings |= {name: one_vector(name, vector, d) for name, vector in vectors.items()}
+        targets = None if via is None else via_points(via, d, span=PHASES)
+        movement = modulated(rollout(self, settings, 1.0, None, n_samples=2), targets)
+        check_one(len(movement))
+        origin, tau, gain = movement.baselines[0].copy(), float(movement.periods[0]), float(movement.ratio[0])
+        size, ones = 2.0 * abs(gain) * float(self.amplitudes[0]), np.ones(d)
+        if movement.change is not None:
+            weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
+        mixing = np.zeros((dmp.n_basis + 1, d + 1))
+        mixing[:-1, :-1] = weights.T
+        plan = Plan(  # a discrete movement whose shape repeats around its baseline
+            dmp,
+            mixing,
+            ratio=lambda goal: ones,
+            origin=origin,
+            goal=np.zeros(d),
+            state=np.vstack((movement.positions[0, 0] - origin, movement.velocities[0, 0] * tau)),
+            duration=tau,
+            settle=0.0,
+            n_positions=d,
+            begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
+            periodic=True,
+            longest_step=_LONGEST_STEP,
+            via=None if targets is None else ViaPlaces(targets.times, targets.points[0] - origin, MISSED * size),
+        )
         return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)
-
-
-def plan_of(
-    primitive: RhythmicPrimitives, options: dict[str, ArrayLike | None], via: ViaLike | None = None
-) -> tuple[Plan, float]:
-    """The plan of one limit cycle, a discrete movement whose shape repeats around its baseline, and its amplitude."""
-    check_one(len(primitive))
-    d, dmp = primitive.n_dims, primitive.dmp
-    vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
-    targets = None if via is None else via_points(via, d, span=PHASES)
-    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), targets)
-    check_one(len(movement))
-    origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
-    gain, ones, weights = float(movement.ratio[0]), np.ones(d), primitive.scaled_weights[0]
-    size = 2.0 * abs(gain) * float(primitive.amplitudes[0])
-    if movement.change is not None:
-        weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
-    mixing = np.zeros((dmp.n_basis + 1, d + 1))
-    mixing[:-1, :-1] = weights.T
-    plan = Plan(
-        dmp,
-        mixing,
-        ratio=lambda goal: ones,
-        origin=origin,
-        goal=np.zeros(d),
-        state=np.vstack((movement.positions[0, 0] - origin, movement.velocities[0, 0] * tau)),
-        duration=tau,
-        settle=0.0,
-        n_positions=d,
-        begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
-        periodic=True,
-        longest_step=_LONGEST_STEP,
-        via=None if targets is None else ViaPlaces(targets.times, targets.points[0] - origin, MISSED * size),
-    )
-    return plan, gain
 
 
 def refuse_others(what: str, options: Mapping[str, object]) -> None:

@@ -92,10 +92,7 @@ class RhythmicRollout(BaseRollout):
 
 
 def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[Array, Array], order: int) -> Array:
-    """The x - b (n, d, T), or a derivative in u, on the limit cycle of weights (1 or n, d, N), times the ratio (n,).
-
-    `when` is the phases (n,) of the movements and how many radians past them (T,).
-    """
+    """The x - b (n, d, T), or a derivative in u, on the limit cycle, at `when`: phases (n,), radians past them (T,)."""
     (phases, turn), response = when, limit_cycle(dmp)
     harmonics = np.arange(response.shape[1])
     response = response * (2j * np.pi * harmonics) ** order
@@ -117,21 +114,15 @@ def rollout(
         for name, option in options.items()
     }
     n = via_points.broadcast_length(len(primitives), given)
-
-    def fill(name: str, default: Array) -> Array:
-        option = given[name]
-        value = default if option is None else option
-        return np.broadcast_to(value, (n, *value.shape[1:]))
-
     check_number("n_periods", n_periods, above=0.0)
-    periods = fill("period", primitives.row("periods"))
+    periods = via_points.filled(given["period"], primitives.row("periods"), n)
     via_points.check_durations("period", periods)
     return RhythmicRollout(
         primitives,
-        fill("amplitude", primitives.row("amplitudes")) / primitives.row("amplitudes"),
-        fill("baseline", primitives.row("baselines")),
+        via_points.filled(given["amplitude"], primitives.row("amplitudes"), n) / primitives.row("amplitudes"),
+        via_points.filled(given["baseline"], primitives.row("baselines"), n),
         periods,
-        fill("phase", np.zeros(1)),
+        via_points.filled(given["phase"], np.zeros(1), n),
         given["start"],
         given["velocity"],
         float(n_periods),
@@ -164,11 +155,7 @@ def modulated(movement: RhythmicRollout, via: via_points.ViaLike | via_points.Vi
     if via is None:
         return movement
     dmp = movement.primitives.dmp
-    targets = (
-        via
-        if isinstance(via, via_points.ViaPoints)
-        else via_points.via_points(via, movement.baselines.shape[1], span=PHASES)
-    )
+    targets = via_points.via_points(via, movement.baselines.shape[1], span=PHASES)
     n = via_points.broadcast_length(len(movement), {"via": targets.points}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
     if not movement.ratio.all():

@@ -26,7 +26,6 @@ from kineme.dmp.discrete.via_points import ViaLike
 from kineme.dmp.recorded_as import merged
 from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.channel import check_alike
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
@@ -44,8 +43,7 @@ class AveragePrimitive:
     ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
 
     - `primitive`: the mean, a batch of one: roll it out, describe it, control with it as with any other. It knows
-      nothing of the covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points
-      as the demonstrations would.
+      nothing of the covariance, see `rollout`.
     - `factor` (r, d, N + 3): centered, weighted deviations of theta from the mean; r is at most n and at most d (N +
       3).
     - `tempo_factor` (r,): the same for ln tau.
@@ -253,13 +251,7 @@ class AveragePrimitive:
 
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
-        primitives = movements if isinstance(movements, Primitives) else own.dmp.learn(movements)
-        if primitives.dmp != own.dmp:
-            raise SpecificationError(f"expected primitives of the same specification, {own.dmp}, got {primitives.dmp}")
-        if primitives.n_dims != own.n_dims:
-            raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
-        check_alike([own.moving_channels, primitives.moving_channels], "movement")
-        return primitives
+        return parameters.of_kind(movements, own.dmp, own.n_dims, own.moving_channels, "the same")
 
 
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:

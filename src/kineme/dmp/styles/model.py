@@ -20,7 +20,7 @@ from kineme.dmp.discrete.operators import forcing_matrix
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.channel import Channels, check_alike
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
@@ -147,16 +147,9 @@ class StyleModel:
         SpecificationError
             Primitives of another specification or dimension than the demonstrations'.
         """
-        primitives = movements if isinstance(movements, Primitives) else self.dmp.learn(movements)
-        if primitives.dmp != self.dmp:
-            raise SpecificationError(
-                f"expected primitives of the model's own specification, {self.dmp}, got {primitives.dmp}; pass the "
-                "movements themselves and they are learned with it"
-            )
-        if primitives.n_dims != len(self.mean):
-            raise SpecificationError(f"expected movements of {len(self.mean)} dimensions, got {primitives.n_dims}")
         ours = None if self.recorded_as is None else self.recorded_as.moving
-        check_alike([ours, primitives.moving_channels], "movement")
+        remedy = "; pass the movements themselves and they are learned with it"
+        primitives = parameters.of_kind(movements, self.dmp, len(self.mean), ours, "the model's own", remedy)
         rest = compared(self.metric, self.dmp, parameters.to_numbers(primitives) - self.mean)
         styles = rest @ (self.directions / np.sum(self.directions**2, axis=1, keepdims=True)).T  # they are orthogonal
         residuals = np.linalg.norm(rest - styles @ self.directions, axis=1)

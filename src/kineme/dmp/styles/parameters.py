@@ -30,6 +30,7 @@ from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
+from kineme.movements.channels.channel import Channels, check_alike
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import LARGEST, Array, as_numbers
@@ -66,6 +67,24 @@ def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None)
     if isinstance(movements, Batch):
         check_primitives(movements)
     return movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
+
+
+def of_kind(
+    movements: Primitives | MovementsLike,
+    dmp: DMP,
+    n_dims: int,
+    channels: Channels | None,
+    whose: str,
+    remedy: str = "",
+) -> Primitives:
+    """Movements as primitives of this specification, dimension and kind of channels; others are refused."""
+    primitives = movements if isinstance(movements, Primitives) else dmp.learn(movements)
+    if primitives.dmp != dmp:
+        raise SpecificationError(f"expected primitives of {whose} specification, {dmp}, got {primitives.dmp}{remedy}")
+    if primitives.n_dims != n_dims:
+        raise SpecificationError(f"expected movements of {n_dims} dimensions, got {primitives.n_dims}")
+    check_alike([channels, primitives.moving_channels], "movement")
+    return primitives
 
 
 def from_numbers(

@@ -97,7 +97,7 @@ def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
     """Refuse channels whose columns do not mean the same, where that is known; `what` messages call each of `several`.
 
     Columns of equal names are the same, whatever their kinds were guessed to be. Those of other names may be the other
-    hand's: they need the same kinds, and not the same names in another order. Units that are known are equal.
+    hand's: they need the same kinds, and not the same names in another order.
     """
     detected = [(i, channels) for i, channels in enumerate(several) if channels is not None]
     for i, channels in detected[1:]:

@@ -1,7 +1,4 @@
-"""Columns of one recording beside those of another: the same by their names, whatever their order and their units.
-
-Columns of one file in several units of one quantity, ``x_mm`` beside ``y_m``, are read in the unit of most of them.
-"""
+"""Columns of one recording beside those of another: the same by their names, whatever their order and their units."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channel, Channels, recorded_names
-from kineme.movements.rotations import NORM_TOLERANCE, conjugate, log, product
+from kineme.movements.rotations import NORM_TOLERANCE, conjugate, log, odd_flips, product
 from kineme.units import UNITS, converted, unit_named
 from kineme.validation import Array
 
@@ -56,10 +56,7 @@ def off_norm(columns: Array, channels: Channels) -> Iterator[tuple[Channel, NDAr
 
 
 def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
-    """Recorded columns (total, m) with angles that do not jump, and quaternions of norm 1 whose signs do not either.
-
-    The norms of quaternions have been checked.
-    """
+    """Recorded columns (total, m) with angles that do not jump, and checked quaternions whose signs do not either."""
     result = np.array(columns, dtype=np.float64, order="C")
     for channel, rows in zip(channels, columns_of(channels), strict=True):
         if channel.kind == "angle":
@@ -114,10 +111,7 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
 
 
 def lever_of(channels: Channels) -> float:
-    """Return the length of a radian beside positions: 0.2 m in their unit, meters if unknown; without positions, 1.
-
-    It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
-    """
+    """Return the length of a radian beside positions: 0.2 m, as of a hand or a tool, in their unit; without, 1."""
     units = [channel.unit for channel in channels if channel.kind == "position"]
     if not units:
         return 1.0
@@ -132,8 +126,7 @@ def as_wxyz(q: Array, channel: Channel) -> Array:
 
 def continuous_signs(q: Array, offsets: NDArray[np.intp]) -> Array:
     """Quaternions (total, 4) of norm 1; along each movement neighbors lie in one hemisphere, its first stays."""
-    flips = np.concatenate(([False], (q[1:] * q[:-1]).sum(axis=1) < 0))
-    odd = np.logical_xor.accumulate(flips)
+    odd = odd_flips(q)
     odd ^= np.repeat(odd[offsets[:-1]], np.diff(offsets))
     norms = np.linalg.norm(q, axis=1, keepdims=True)
     norms[np.abs(norms - 1.0) < _ROUNDING] = 1.0  # every bit as recorded
@@ -178,8 +171,8 @@ def period_by_unit(unit: str | None) -> float | None:
 def period_of(angles: Array, unit: str | None) -> float:
     """The period of an angle: by its unit, or, where that says nothing, by its values.
 
-    These are taken for radians within one turn, else for degrees; beyond a turn of those nothing wraps, and the period
-    is infinite. So it is where whole turns are all that moves: a switch between 0 and 360.
+    These are taken for radians within one turn, else for degrees; beyond a turn of those, and where only whole turns
+    move, as a switch between 0 and 360, nothing wraps, and the period is infinite.
     """
     if (period := period_by_unit(unit)) is not None:
         return period

@@ -184,10 +184,7 @@ def _may_be_percent(values: Array) -> bool:
 
 
 def find_numbered_joints(heads: Sequence[str], free: Sequence[int], columns: Array) -> set[int]:
-    """Those of the columns `free` whose numbers say that they are joints.
-
-    One alone, as q1, could be anything. Several that count from 0 or 1, each within a turn, are joints.
-    """
+    """Those of the columns `free` that are joints: several, as q1, q2, that count from 0 or 1, each within a turn."""
     groups: dict[tuple[str, ...], dict[int, int]] = {}
     for k in free:
         *stem, number = words_of(_UNIT.sub("", heads[k])) or ("",)
@@ -263,8 +260,8 @@ def _unit_norms(q: Array) -> bool:
 def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
     """The order of a numbered quaternion, whose signs change where its scalar would become negative.
 
-    Many programs write quaternions with a scalar that is not negative. Its column then stays so on both sides of
-    every change of sign, which the other end of the quaternion does not.
+    Many programs write no negative scalar. Its column then stays so on both sides of every change of sign, which the
+    other end of the quaternion does not.
     """
     changes = (q[1:] * q[:-1]).sum(axis=1) < 0
     changes[offsets[1:-1] - 1] = False
@@ -284,10 +281,7 @@ _NO_PLACES = _OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "eu
 
 
 def point_names(channels: Channels | None) -> tuple[str, ...]:
-    """Return names of the points that the columns are, one after the other: x, y, z or x, y of each, under one name.
-
-    None where they are anything else: one point, other quantities, other orders, or no names.
-    """
+    """Return names of the points whose x, y, z or x, y the columns are, one after the other; none of anything else."""
     for axes in ("xyz", "xy"):
         n, d = len(channels or ()), len(axes)
         if channels is None or n < 2 * d or n % d:

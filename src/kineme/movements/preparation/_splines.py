@@ -108,11 +108,10 @@ def _load(parameter, positions, offsets, scales, first, knots):  # type: ignore[
 
 @jit
 def _smooth(knots, length):  # type: ignore[no-untyped-def]
-    """Reinsch's smoothing spline in the time in which the penalty is 1: second derivatives m, and x smoothed.
+    """Second derivatives m, and x smoothed, as `smooth.smoothing_spline` does.
 
-    With Q the second divided differences and R the Gram matrix of hat functions, both banded, ``(R + Q'Q) m = Q'x``,
-    and the smoothed positions are ``x - Q m``. The factors are L D L'; `pivot` holds 1 / D, `above` the first
-    off-diagonal of L D, whose second one is the product of two neighboring inverse gaps.
+    The factors are L D L'; `pivot` holds 1 / D, `above` the first off-diagonal of L D, whose second one is the product
+    of two neighboring inverse gaps.
     """
     for lane in range(_LANES):
         knots[1].inverse[lane], knots[2].inverse[lane] = 1.0 / knots[1].gap[lane], 1.0 / knots[2].gap[lane]

@@ -55,13 +55,10 @@ def cut_pauses(
     So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
     of a movement and representations over time divide by its duration.
 
-    A gap is a step that is longer than three median ones, than three times its neighbors, and than three times what its
-    length takes at the mean speed in motion. It counts as the longest of these, by the latter two as at most a tenth of
-    the time in motion. A rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in
-    which they begin: within 0.015 of the movement's reach, its largest distance from its first sample, whatever its
-    direction. It counts as at most a tenth of the time in motion, after the start as at most the time that 0.2 of the
-    reach takes at the mean speed, too, and at the end as at most a quarter of the time in motion. It keeps as many
-    samples as fit into that, evenly spaced, at least three.
+    A gap counts as the longest of what `GAP` says, by neighbors and length as at most `PAUSE`. A rest is a run of
+    windows that stay within `RADIUS` of the sample in which they begin. It counts as at most `PAUSE`, after the start
+    as at most `REST`, too, and at the end as at most `LAST_REST`; of its samples as many are kept as fit into that,
+    evenly spaced, at least three.
 
     `allowance` times these shares of the time in motion, and of the reach, are left of pauses. Without `rests` these
     stay, and gaps alone are cut short: who holds a value says something by how long. Times are returned from 0 in each

@@ -1,8 +1,6 @@
 """Smooth movements with the cubic smoothing spline, and interpolate them on an even grid by cubic splines.
 
-The interpolating spline is the not-a-knot cubic spline of `scipy.interpolate.CubicSpline`: fourth order, exact for
-cubics, and twice continuously differentiable, as the second derivative in the fit requires. It is taken movement by
-movement or as one matrix.
+The interpolating spline is not-a-knot: twice continuously differentiable, as the second derivative in the fit requires.
 """
 
 from __future__ import annotations
@@ -58,7 +56,14 @@ class Smooth:
         smoothed = np.empty_like(demonstrations.positions)
 
         def smooth_tile(start: int, stop: int) -> None:
-            _fill_smoothed(demonstrations, start, stop, self.cutoff, smoothed)
+            offsets, scales = _tile(demonstrations, start, stop, self.cutoff)
+            times, positions = demonstrations.movements.spread, demonstrations.positions
+            if _compiled(demonstrations, offsets):
+                splines = compiled_module("kineme.movements.preparation._splines")
+                splines.fill_smoothed(times, positions, offsets, scales, smoothed)
+                return
+            starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
+            smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
 
         for_tiles(smooth_tile, len(demonstrations), _TILE_MOVEMENTS)
         return replace(demonstrations.movements.positions_only, positions=smoothed)
@@ -67,9 +72,8 @@ class Smooth:
 def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, n_points: int) -> Array:
     """Smoothing splines of movements start:stop, see `Smooth`, at `n_points` even times: (stop - start, d, n_points).
 
-    The smoothing splines themselves are evaluated, from their second derivatives; `Smooth` followed by `Resample`
-    would fit other splines through their values. The first recorded position is subtracted, so that a large offset
-    costs no digits.
+    These splines themselves are evaluated; `Smooth` followed by `Resample` would fit others through their values. The
+    first recorded position is subtracted, so that a large offset costs no digits.
     """
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.movements.spread, demonstrations.positions
@@ -81,18 +85,6 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
     rows = np.empty((stop - start, demonstrations.n_dims, n_points))
     compiled_module("kineme.movements.preparation._splines").fill_smooth_rows(times, positions, offsets, scales, rows)
     return rows
-
-
-def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, smoothed: Array) -> None:
-    """Smooth movements start:stop at their own stamps."""
-    offsets, scales = _tile(demonstrations, start, stop, cutoff)
-    times, positions = demonstrations.movements.spread, demonstrations.positions
-    if _compiled(demonstrations, offsets):
-        splines = compiled_module("kineme.movements.preparation._splines")
-        splines.fill_smoothed(times, positions, offsets, scales, smoothed)
-        return
-    starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
-    smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
 
 
 def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:
@@ -113,12 +105,9 @@ def _tile(demonstrations: Demonstrations, start: int, stop: int, cutoff: float) 
 def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], scales: Array) -> tuple[Array, Array]:
     """Smoothed positions minus the first recorded one, and second derivatives, of all movements.
 
-    In the time ``v = scale t`` in which the penalty is 1: with Q the second divided differences and R the Gram matrix
-    of hat functions, both banded, the second derivatives m of the spline solve ``(R + Q'Q) m = Q'x``, and the smoothed
-    positions are ``x - Q m``.
-
-    Of samples (total,) and (total, d) of all movements, at least three each; `scales` (n,) are ``penalty ** (-1/3)``,
-    with the penalty in the unit of the times. Source: Reinsch, see `Smooth`.
+    In the time ``v = scale t`` in which the penalty is 1, `scales` (n,) being ``penalty ** (-1/3)``: with Q the second
+    divided differences and R the Gram matrix of hat functions, both banded, the second derivatives m of the spline
+    solve ``(R + Q'Q) m = Q'x``, and the smoothed positions are ``x - Q m``. Source: Reinsch, see `Smooth`.
     """
     from scipy.linalg import solve_banded
 
@@ -167,11 +156,7 @@ def even_rows_of_spline(v: Array, x: Array, m: Array, offsets: NDArray[np.intp],
 
 @lru_cache(maxsize=64)
 def spline_matrix(n_in: int, n_out: int) -> Array:
-    """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples.
-
-    With the B-spline values B at the samples and C at the points, the map is ``C B^-1``; solving with the transposed,
-    banded B needs no more memory than the result.
-    """
+    """The linear map (n_out, n_in) between even samples: ``C B^-1``, of B-spline values B at the ones, C at others."""
     from scipy.interpolate import BSpline
     from scipy.sparse.linalg import splu
 
@@ -189,9 +174,7 @@ def spline_matrix(n_in: int, n_out: int) -> Array:
 def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n_points: int) -> Array:
     """Interpolate movements on `n_points` even values of their parameter, relative to their start, (n, d, n_points).
 
-    The parameter (total,) is strictly increasing within each movement: time, or arc length. Movement i holds the
-    samples ``offsets[i]:offsets[i + 1]`` of it and of the positions (total, d). A large offset of these costs no
-    digits.
+    The parameter (total,) increases within each movement: time, or arc length.
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))

@@ -72,8 +72,7 @@ class Rest:
     def __post_init__(self) -> None:
         check_number("speed", self.speed, above=0.0, below=0.5)
         for name in ("min_rest", "min_movement"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), least=0.0)
+            check_number(name, getattr(self, name), least=0.0, optional=True)
 
     @property
     def resolution(self) -> float:
@@ -90,8 +89,7 @@ class Rest:
         """The piece of each movement: it ends in the middle of the rests beside it, or between it and a twitch."""
         bouts, last_enough = self._bouts(motion)
         middles = (bouts[:-1, 1] + bouts[1:, 0]) // 2
-        edges = np.concatenate(([0], middles, [len(motion.times)]))
-        return np.column_stack((edges[:-1], edges[1:]))[last_enough]
+        return consecutive(middles, len(motion.times))[last_enough]
 
     def _bouts(self, motion: Motion) -> tuple[Rows, NDArray[np.bool_]]:
         """Runs of motion, rows (n, 2), and which of them are movements."""
@@ -155,8 +153,7 @@ class SpeedMinima:
             check_number("turn", self.turn, above=0.0)
             if self.turn >= np.pi:
                 raise SpecificationError(f"expected turn below pi, got {self.turn!r}; angles are in radians")
-        if self.min_movement is not None:
-            check_number("min_movement", self.min_movement, least=0.0)
+        check_number("min_movement", self.min_movement, least=0.0, optional=True)
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
@@ -385,8 +382,7 @@ def without_glitches(positions: Array) -> Array:
 def noise_deviations(positions: Array) -> Array:
     """Return the standard deviation (d,) of white noise on (T, d) positions.
 
-    Estimated from the median size of third differences, to which a smooth path hardly contributes: for Gaussian noise
-    it is ``0.6745 sqrt(20) sigma``. A median, so that single jumps have no influence.
+    The median size of third differences, to which neither smooth paths nor jumps contribute, is 0.6745 sqrt(20) of it.
     """
     sizes = np.median(np.abs(np.diff(positions, n=3, axis=0)), axis=0)
     return np.asarray(sizes / (0.6745 * np.sqrt(20.0)))

@@ -234,16 +234,6 @@ def turns(observed: Observed) -> Events:
     return Events(observed.times[rows], turn[rows], np.full(len(rows), 0.5 * _WINDOW))
 
 
-def gripper_events(observed: Observed) -> Events:
-    """Begin and end of each closing or opening of a gripper."""
-    return _begin_and_end(observed, observed.others["gripper"], 2.0)
-
-
-def object_events(observed: Observed) -> Events:
-    """Begin and end of the movements of objects, which lag behind those of the arm."""
-    return _begin_and_end(observed, observed.others["object"], 1.0)
-
-
 def contact_events(observed: Observed) -> Events:
     """Steps of contacts and forces: their height by the standard deviation of noise, from 6 on."""
     from scipy.signal import find_peaks
@@ -258,16 +248,6 @@ def contact_events(observed: Observed) -> Events:
     return Events(times, strengths, np.full(len(times), _SMOOTHING))
 
 
-#: Cue -> its events in an observed recording.
-CUES: dict[str, Callable[[Observed], Events]] = {
-    "speed": slow_moments,
-    "direction": turns,
-    "gripper": gripper_events,
-    "contact": contact_events,
-    "object": object_events,
-}
-
-
 def _begin_and_end(observed: Observed, columns: Array, strength: float) -> Events:
     """Return begin and end of the bouts of motion of columns (n, k) together."""
     extents = np.ptp(columns, axis=0)
@@ -280,6 +260,16 @@ def _begin_and_end(observed: Observed, columns: Array, strength: float) -> Event
     bouts = moving_bouts(speed, low, 3.0 * low if 3.0 * low < speed.max() else low)
     times = observed.times[np.column_stack((bouts[:, 0], bouts[:, 1] - 1)).ravel()]
     return Events(times, np.full(len(times), strength), np.full(len(times), _SMOOTHING))
+
+
+#: Cue -> its events in an observed recording.
+CUES: dict[str, Callable[[Observed], Events]] = {
+    "speed": slow_moments,
+    "direction": turns,
+    "gripper": lambda observed: _begin_and_end(observed, observed.others["gripper"], 2.0),
+    "contact": contact_events,
+    "object": lambda observed: _begin_and_end(observed, observed.others["object"], 1.0),  # lag behind the arm
+}
 
 
 def _on_grid(events: Events, t: Array) -> Array:

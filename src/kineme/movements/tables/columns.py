@@ -63,7 +63,7 @@ class Roles(NamedTuple):
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
-    """Find the roles of columns by their heads and what they hold, "number", "date" or "text"; choices take precedence.
+    """Find roles by heads and by what columns hold, "number", "date" or "text"; choices take precedence.
 
     In a file without heads, not `named`, the first column of numbers is time and the others are coordinates.
     """
@@ -299,10 +299,8 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
         return column_numbers(heads, layout.keys)
     if not named:
         return ()
-    kind = MOVEMENT_WORDS
-    return tuple(
-        k for k, head in enumerate(heads) if k != label and (_named_as(head, kind) or words_of(head) == ("id",))
-    )
+    named_so = [k for k, head in enumerate(heads) if _named_as(head, MOVEMENT_WORDS) or words_of(head) == ("id",)]
+    return tuple(k for k in named_so if k != label)
 
 
 def beside_positions(heads: Sequence[str]) -> set[str]:

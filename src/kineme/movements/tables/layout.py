@@ -1,7 +1,4 @@
-"""The caller's choices about the columns of a recording, what is not given is detected; and what is parsed with them.
-
-Movements are parsed from a table or from arrays as a block, not yet checked, with how they were understood.
-"""
+"""The caller's choices about the columns of a recording, of which others are detected; and what is parsed with them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A table of samples, and its movements: wide, one; or long, many that columns tell apart.
-
-The roles of the columns of data frames of pandas and polars are found as in files. Neither package is imported.
-"""
+"""A table of samples, or a data frame, and its movements: wide, one; or long, many that columns tell apart."""
 
 from __future__ import annotations
 
@@ -182,10 +179,7 @@ def _split_segments(
 
 
 def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:
-    """A unique text for each movement from the columns that tell them apart, with the label if it is needed.
-
-    It is needed where the movements of every label are counted from 1.
-    """
+    """A unique text for each movement from what tells them apart; with the label if all labels count from 1."""
     for some in ([key[labeled:] for key in keys], keys):
         places = ["/".join(map(str, key)) for key in some]
         if len(set(places)) == len(places):
@@ -194,10 +188,7 @@ def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:
 
 
 def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
-    """The movements of a data frame: one, or many that are told apart by columns.
-
-    The levels of a pandas index that have a name, or hold dates, count as columns that cannot be coordinates.
-    """
+    """The movements of a data frame; named or dated levels of a pandas index are columns, but no coordinates."""
     read = [(head, _values(series), inside) for head, series, inside in _columns(frame)]
     heads = tuple(head for head, _, _ in read)
     arrays = [values for _, values, _ in read]

@@ -75,10 +75,9 @@ def unit_in_head(head: str) -> str | None:
 def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     """The unit of stamps (total,) below a head that does not say it, and the source of that knowledge.
 
-    The median step decides, because people and robots are sampled between once and some thousand times a second.
-    Stamps between the years 2000 and 2100 are seconds since 1970 in the unit of which that is so, unless it makes the
-    step longer than 5 s: then they count from elsewhere, as a machine that was switched on weeks ago counts. So are
-    those that are such years in 100 ns since 1601 or since the year 1, as Windows and .NET count.
+    Stamps between the years 2000 and 2100 count from 1970 in the unit of which that is so, unless it makes the step
+    longer than 5 s, as of a machine that was switched on weeks ago; so do those of such years in 100 ns since 1601 or
+    since the year 1, as Windows and .NET count. Of others the median step decides.
 
     Refused are such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it (a head with a word
     as unix decides); ticks that count from elsewhere; and steps of 200,000 to a million, or relative times in

@@ -53,10 +53,7 @@ def fill_extents(positions, offsets, extents):  # type: ignore[no-untyped-def]
 
 @jit
 def nth_smallest(values, n):  # type: ignore[no-untyped-def]
-    """The n-th smallest value, counted from 0; `values` are left partly sorted.
-
-    Selection of C. A. R. Hoare (1961, Algorithm 65: FIND). Numba's `np.partition` takes ten times as long to compile.
-    """
+    """The n-th smallest value, from 0, by C. A. R. Hoare (1961, Algorithm 65); `np.partition` is slow to compile."""
     low, high = 0, len(values) - 1
     while low < high:
         pivot, i, j = values[(low + high) // 2], low, high

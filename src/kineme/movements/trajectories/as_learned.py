@@ -143,10 +143,7 @@ def as_recorded(demos: Demonstrations) -> Demonstrations:
 
 
 def _in_units(demos: Demonstrations, learned: Channels) -> Demonstrations:
-    """Coordinates in the units of those that were learned, where both are known.
-
-    Rotations beside positions of another unit, or of one that is not known, count as they do beside those learned.
-    """
+    """Coordinates in the units of those that were learned, where both are known; rotations as beside those learned."""
     channels = demos.channels or ()
     moving = [[channel for channel in some if channel.coordinates] for some in (channels, learned)]
     ours, theirs = (next((channel.unit for channel in some if channel.kind == "position"), None) for some in moving)

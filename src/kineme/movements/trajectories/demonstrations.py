@@ -14,16 +14,13 @@ from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.channels.column_match import in_one_unit
 from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
-from kineme.movements.tables.layout import Parsed
+from kineme.movements.tables.layout import Column, Layout, Parsed
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
 from kineme.validation import Array, describe
-
-if TYPE_CHECKING:
-    from kineme.movements.tables.layout import Column, Layout
 
 _SHOWN = 8  # names of dimensions
 _NESTED = 8  # records around movements; more are a mistake, such as a stand-in that has every attribute
@@ -129,8 +126,6 @@ class Demonstrations(Presented, Sequence[Trajectory]):
             No column of times that is known by its name or given, several of them, no coordinates, or samples that
             are no movement; the message lists the columns.
         """
-        from kineme.movements.tables.layout import Layout
-
         several = frames_of(frames) or list(frames)
         layout = Layout(time, columns, movement, label, units, kinds=kinds)
         return cls.of_movements(collect_data_frames(several, layout))

@@ -24,9 +24,8 @@ _ADVICE = "name the action, or leave the movement out"
 def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] | None = None) -> NDArray[Any]:
     """One label per movement as an array of shape (n,); names of the movements are for messages.
 
-    Texts, and anything else that is not a number, become an array of objects, texts as plain `str`. A NumPy array of
-    fixed-width texts would make every label as large as the longest, and would merge labels that differ in trailing
-    NULs. Numbers stay an array of numbers.
+    Numbers stay numbers. Texts become objects, plain `str`: in an array of fixed width each would be as large as the
+    longest, and labels that differ in trailing NULs would be one.
     """
     if not isinstance(labels, np.ndarray):  # `np.asarray` of a list would convert numbers beside texts to texts
         labels = np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
@@ -77,10 +76,7 @@ def _kind(label: Any) -> str:
 
 
 def as_indices(index: Any, n: int) -> NDArray[np.intp]:
-    """Return a choice among n movements as indices from 0: of shape () for an integer, else (k,).
-
-    It is an integer, a slice, a list of integers or a mask; negative integers count from the end.
-    """
+    """Return an integer as an index from 0 of shape (), a slice, a list of integers or a mask as indices (k,)."""
     if isinstance(index, (bool, np.bool_)):  # as ("a", "b") == "a" is
         raise IndexError(f"expected {_WAYS}, got {index}; compare an array, numpy.array(labels) == label")
     if isinstance(index, (int, np.integer)):

@@ -1,7 +1,4 @@
-"""The block behind `Demonstrations`: many movements of unequal length and sampling, one after the other.
-
-Recorded columns become the positions that are learned.
-"""
+"""The block behind `Demonstrations`: many movements of unequal length and sampling, one after the other."""
 
 from __future__ import annotations
 
@@ -112,9 +109,7 @@ class Movements:
         """The chosen movements, in that order, copied into a new block."""
         if len(chosen) == 0:
             raise TrajectoryError("expected at least one movement, got an empty selection")
-        lengths = np.diff(self.offsets)[chosen]
-        offsets = np.concatenate(([0], np.cumsum(lengths)))
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[:-1][chosen] - offsets[:-1], lengths)
+        offsets, rows = samples_of(self.offsets, chosen)
         return self._part(offsets, rows, chosen, self.names and tuple(self.names[i] for i in chosen))
 
     def between(self, start: int, stop: int) -> Movements:
@@ -124,22 +119,22 @@ class Movements:
         return self._part(offsets - offsets[0], rows, chosen, self.names and self.names[chosen])
 
     def _part(self, offsets: NDArray[np.intp], rows: Any, chosen: Any, names: Names) -> Movements:
-        return Movements(
-            self.positions[rows],
-            offsets,
-            self.durations[chosen],
-            None if self.times is None else self.times[rows],
-            None if self.labels is None else self.labels[chosen],
-            names,
-            self.dimensions,
-            self.channels,
-            None if self.recorded is None else self.recorded[rows],
-        )
+        of_samples, of_movements = ("positions", "times", "recorded"), ("durations", "labels")
+        parts = {name: getattr(self, name) for name in (*of_samples, *of_movements)}
+        own = {name: x[rows if name in of_samples else chosen] for name, x in parts.items() if x is not None}
+        return replace(self, offsets=offsets, names=names, **own)
 
     @property
     def positions_only(self) -> Movements:
         """The same movements without what `recorded` holds beside the positions, for steps that change samples."""
         return self if self.recorded is None else replace(self, channels=None, recorded=None)
+
+
+def samples_of(offsets: NDArray[np.intp], chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Offsets of the chosen movements, in that order, and the rows of their samples among those of all."""
+    lengths = np.diff(offsets)[chosen]
+    own = np.concatenate(([0], np.cumsum(lengths)))
+    return own, np.arange(own[-1]) + np.repeat(offsets[:-1][chosen] - own[:-1], lengths)
 
 
 class Samples(NamedTuple):
@@ -194,10 +189,7 @@ def merge_close(
 
 
 def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
-    """Stamps (total,) of which consecutive ones are at least `CLOSEST` apart; later stamps are moved.
-
-    Each movement is treated alone, so that none depends on the others; usually no movement has such stamps.
-    """
+    """Stamps (total,) of each movement, usually as they are, moved later until all are at least `CLOSEST` apart."""
     lengths, durations = np.diff(offsets), times[offsets[1:] - 1] - times[offsets[:-1]]
     least = CLOSEST * durations / (lengths - 1)
     short = np.diff(times) < np.repeat(least, lengths)[1:]
