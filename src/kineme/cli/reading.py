@@ -145,19 +145,11 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     from kineme.io.limits import read_limited
     from kineme.io.reading.recordings import read_paths
 
-    layout, rule, how, join = _how(options, library)
     several = [paths] if isinstance(paths, Path) else list(paths)
     files = [path for path in several if str(path) != "-"]
     given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
-    return read_paths(
-        files,
-        layout,
-        rule,
-        **how,
-        join=join,
-        progress=lambda paths: progress(paths, desc="reading", unit="file"),
-        standard_input=given,
-    )
+    reading = partial(progress, desc="reading", unit="file")
+    return read_paths(files, _how(options, library), reading, given)
 
 
 def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
@@ -177,8 +169,7 @@ def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, place
 
     if any(str(path) == "-" for path in paths):
         raise click.UsageError("expected files or folders to search, got the standard input")
-    layout, rule, how, _ = _how(options, library)
-    return read_pieces(paths, layout, rule, **how, places=places)
+    return read_pieces(paths, _how(options, library), places)
 
 
 def seconds_of(paths: Sequence[Path]) -> float | None:
@@ -202,7 +193,7 @@ def _data_sets(paths: Sequence[Path]) -> list[Path] | None:
 
 
 def _how(options: dict[str, Any], library: Any) -> Any:
-    """The layout and the rule of names that the `layout_options` say, the switches, and whether files are joined."""
+    """What the `layout_options` say, with what the library has learned."""
     from kineme.io.reading.recordings import how_to_read
 
     reference = None
