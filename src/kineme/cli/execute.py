@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from kineme.cli import options as opts
-from kineme.cli.output import check_new, say
+from kineme.cli.output import check_new, say, to_json
 from kineme.reporting.text import printable
 
 _SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "stop_at_each_step", "plot", "view")  # of what moves
@@ -48,7 +48,6 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
 
     Example: kineme execute plan.json --library actions/ --robot panda --simulate --disturb push:0,30,0@1.5 -o run.json
     """
-    from kineme.library.library import ActionLibrary
     from kineme.planning.execution import check_steps
     from kineme.planning.plan import read_plan
     from kineme.reporting.table import to_text
@@ -57,7 +56,7 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
     _check_options(plan, output, options)
     steps = read_plan(plan)
     robot = load(options["robot"], options["tip"])
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         execution = (
             _simulated(steps, library, robot, options)
             if options["simulate"]
@@ -101,7 +100,6 @@ def _simulated(plan: Any, library: Any, robot: Any, options: dict[str, Any]) -> 
 
 
 def _write(execution: Any, robot: Any, output: Path | None, options: dict[str, Any]) -> list[Path]:
-    from kineme.cli.output import to_json
     from kineme.reporting.atomic import write_atomically
 
     report, written = f"{to_json(execution.to_dict())}\n".encode(), []

@@ -11,7 +11,7 @@ import click
 
 from kineme.cli.audit import AuditFiles, audit_text
 from kineme.cli.learn import joined_since, learned_text, named_of
-from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
+from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option, opened
 from kineme.cli.output import check_new, progress, say, table, unlisted
 from kineme.cli.pieces import SHOWN, UNFINISHED
 from kineme.reporting.text import counted, printable
@@ -156,14 +156,13 @@ def _inspected(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, d
 
 def _learned(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Store all movements in the library, in the order of the archive."""
-    from kineme.library.library import ActionLibrary
     from kineme.pieces.learned import learned, survey
 
     if files.output is not None or files.mask is not None:
         raise click.UsageError("expected no --output and no --train-mask, learn stores movements in its library")
     of = survey(tables, asked, data["problems"])
     data["notes"] = list(of.notes)
-    with ActionLibrary(asked.options["library"]) as library, progress(total=of.rows, desc="learning") as bar:
+    with opened(asked.options["library"], read_only=False) as library, progress(total=of.rows, desc="learning") as bar:
         before, n = library.version, 0
         totals: Counter[str] = Counter()
         symbols: dict[str, None] = {}

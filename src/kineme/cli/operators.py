@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FILE, Finite, GroupedCommand, force_option, heading, json_option, library_option
-from kineme.cli.output import check_new, say
+from kineme.cli.options import FILE, Finite, GroupedCommand, force_option, heading, json_option, library_option, opened
+from kineme.cli.output import check_new, say, to_json
 from kineme.reporting.text import counted, first_names
 
 _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
@@ -39,7 +39,6 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
 
     Example: kineme operators --library actions/ --states states.csv -o tea.pddl
     """
-    from kineme.library.library import ActionLibrary
     from kineme.planning.domain import domain_to_dict, kinds_in_words
     from kineme.planning.operators import learn_operators
 
@@ -50,7 +49,7 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
     for path in (output, beside):
         check_new(path, options["force"], *([states] if states else []))
     edits = edits_of(output) if output is not None and form != "behavior-tree" else []
-    with ActionLibrary(folder, read_only=True) as library:
+    with opened(folder) as library:
         domain = learn_operators(
             library, states, radius=options["radius"], error_rate=options["error_rate"], edits=edits
         )
@@ -61,7 +60,6 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
 
 def write_domain(domain: Any, output: Path, form: str) -> list[Path]:
     """Write a domain; return the files."""
-    from kineme.cli.output import to_json
     from kineme.planning.behavior_tree import domain_to_behavior_tree
     from kineme.planning.domain import domain_to_dict, operator_schema
     from kineme.planning.pddl import domain_to_pddl

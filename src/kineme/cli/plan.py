@@ -9,7 +9,7 @@ import click
 
 from kineme.cli import options as opts
 from kineme.cli.operators import opened_domain
-from kineme.cli.output import check_new, say, table
+from kineme.cli.output import check_new, say, table, to_json
 from kineme.reporting.text import counted, printable
 
 
@@ -67,7 +67,6 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
 
 
 def _written(steps: Any, data: dict[str, Any], output: Path) -> Path:
-    from kineme.cli.output import to_json
     from kineme.planning.behavior_tree import plan_to_behavior_tree
     from kineme.reporting.atomic import write_atomically
 
@@ -79,12 +78,11 @@ def _written(steps: Any, data: dict[str, Any], output: Path) -> Path:
 
 def _follow(folder: Any, steps: Any, plot: Path | None) -> list[int | None]:
     """Return the movement that each step follows; draw the paths."""
-    from kineme.library.library import ActionLibrary
     from kineme.planning.figure import draw_plan
     from kineme.planning.skill import nearest_demonstration, skill_of
     from kineme.reporting.figures import save_figure
 
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         skills = {step.operator: skill_of(library, step.operator) for step in steps.steps}
         follows = [
             int(skills[step.operator].movements[nearest_demonstration(skills[step.operator], step.start, step.goal)])

@@ -12,7 +12,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, opened, under
 from kineme.cli.output import progress
 from kineme.reporting.text import first_names, printable
 
@@ -246,9 +246,8 @@ def read_source(options: dict[str, Any]) -> Any:
                 f"columns and primitives are those that it was learned with; say {given[0]} to kineme learn"
             )
         from kineme.library.grounding import learned_of
-        from kineme.library.library import ActionLibrary
 
-        with ActionLibrary(options["folder"], read_only=True) as library:
+        with opened(options["folder"]) as library:
             return learned_of(library.store, source)
     from kineme.dmp.discrete.dmp import DMP
     from kineme.dmp.generation.generate import SAVED, Learned, learn_one, load_saved
@@ -270,9 +269,7 @@ def name_of_source(options: dict[str, Any]) -> str:
     source = options["source"]
     if not _is_symbol(source, options["folder"]):
         return Path(source).stem
-    from kineme.library.library import ActionLibrary
-
-    with ActionLibrary(options["folder"], read_only=True) as library:
+    with opened(options["folder"]) as library:
         return next((symbol.name for symbol in library.symbols() if symbol.id == source), str(source))
 
 
