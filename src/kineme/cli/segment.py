@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, flag_of, force_option, heading, json_option, plot_option, whole
+from kineme.cli.options import (
+    Finite,
+    GroupedCommand,
+    flag_of,
+    force_option,
+    heading,
+    json_option,
+    plot_option,
+    under,
+    whole,
+)
 from kineme.cli.output import check_new, say, table
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.reporting.text import counted, printable
@@ -25,10 +34,10 @@ _PARAMETERS: dict[str, tuple[Any, str]] = {
 }
 
 
-def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
-    for name, (kind, words) in reversed(_PARAMETERS.items()):
-        command = click.option(flag_of(name), type=kind, help=f"Of --by {words}")(command)
-    return command
+_parameters = under(
+    "Options",
+    *(click.option(flag_of(name), type=kind, help=f"Of --by {words}") for name, (kind, words) in _PARAMETERS.items()),
+)
 
 
 @click.command(cls=GroupedCommand, short_help="Cut long recordings into movements.")

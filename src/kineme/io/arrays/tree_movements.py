@@ -51,7 +51,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
-    heads, owners = _heads(first, names)
+    of_arrays = {name: heads_of_array(name, first.entries[name].shape) for name in names}
+    heads = tuple(chain.from_iterable(of_arrays.values()))
+    owners = tuple(name for name, several in of_arrays.items() for _ in several)
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
@@ -138,16 +140,6 @@ def _plainly_named(movement: TreeMovement) -> TreeMovement:
             entries={"" if name == wide[0] else name: entry for name, entry in movement.entries.items()}
         )
     return movement
-
-
-def _heads(movement: TreeMovement, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return a head for each column, and the array that it is of."""
-    heads, owners = [], []
-    for name in names:
-        of_array = heads_of_array(name, movement.entries[name].shape)
-        heads += of_array
-        owners += [name] * len(of_array)
-    return tuple(heads), tuple(owners)
 
 
 def heads_of_array(name: str, shape: Sequence[int]) -> list[str]:

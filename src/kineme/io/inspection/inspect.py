@@ -98,14 +98,8 @@ class Measures(NamedTuple):
 
 def measures_of(recordings: Recordings) -> Measures:
     """Measure each movement."""
-    demos = recordings.demonstrations
-    sampling = sampling_of(demos)
-    extents = extents_of(demos).max(axis=1)
-    labels = np.array([*recordings.labels, None], dtype=object)[:-1]
-    return Measures(
-        labels, demos.lengths, demos.durations, sampling.rates, sampling.jitters, sampling.gaps, sampling.longest,
-        extents,
-    )  # fmt: skip
+    demos, extents = recordings.demonstrations, extents_of(recordings.demonstrations).max(axis=1)
+    return Measures(recordings.labels, demos.lengths, demos.durations, *sampling_of(demos), extents)
 
 
 def summaries(measures: Measures) -> tuple[LabelSummary, ...]:

@@ -91,13 +91,8 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
         reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
         read = FileRead(as_text(relative), []).without_movements(reason)
     else:
-        read = parsed_file(partial(_expanded, form.read_bytes, data), form, relative, layout)
+        read = parsed_file(partial(form.read_bytes, data), form, relative, layout)
     return read._replace(sha256=hashlib.sha256(data).hexdigest(), size=len(data), mtime=mtime)
-
-
-def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layout) -> Parsed:
-    check_expanded(len(data))
-    return read(data, layout)
 
 
 def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
