@@ -137,10 +137,7 @@ def _annotated(
     check: Callable[..., None],
     held: list[Any] | None,
 ) -> _Answer:
-    """Annotate recordings piece by piece, once `check` has seen what is known of the first one.
-
-    Pieces are kept with their annotations in `held`, for a picture of them, unless it is None.
-    """
+    """Annotate recordings piece by piece, once `check` has seen what is known of the first; all are added to `held`."""
     from kineme.io.reading.recordings import paths_of
     from kineme.io.records import Problem
     from kineme.library.annotate import annotate_by

@@ -43,10 +43,7 @@ _BROKEN_PIPE = 128 + 13  # as a shell says it of a tool that the signal ends
 
 
 class _OneLineErrors(click.Group):
-    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback.
-
-    A reader that has gone is no error to speak of: the command ends without a word.
-    """
+    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):

@@ -135,10 +135,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
 
 
 def _of_library(folder: Any, task: str, output: Path, force: bool) -> dict[str, Any]:
-    """The options that say which library parts depend on; to learn, it is created if it does not exist.
-
-    Features depend on its specification, and on bases that are fitted once and lie beside the shards.
-    """
+    """The options that say which library parts depend on; to learn, it is created if it does not exist."""
     from kineme.library.library import ActionLibrary, is_library
     from kineme.library.storage.address import Address, as_location
     from kineme.pieces.shards import shared_reduction

@@ -138,10 +138,7 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
-    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
-
-    Topics of a bag and columns that are not asked for are those of `library`, where a file has them.
-    """
+    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`."""
     from kineme.io.limits import read_limited
     from kineme.io.reading.recordings import read_paths
 
@@ -161,10 +158,7 @@ def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places:
 
 
 def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
-    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them.
-
-    Of data sets, the episodes at these `places` alone, if there are any.
-    """
+    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them."""
     from kineme.io.reading.pieces import read_pieces
 
     if any(str(path) == "-" for path in paths):
@@ -205,10 +199,7 @@ def _how(options: dict[str, Any], library: Any) -> Any:
 
 
 def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
-    """A sentence for each thing to know of recordings that are compared with a library, whose channels are `learned`.
-
-    For topics, frames and columns that were read since it has them, for gaps, and for channels other than its own.
-    """
+    """A sentence for each thing to know of recordings beside those of a library, whose channels are `learned`."""
     from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
@@ -290,10 +281,7 @@ def _is_symbol(source: str, folder: Any) -> bool:
 
 
 def _differences(learned: Any, asked: Any) -> list[str]:
-    """A sentence for each way in which recordings that are compared with a library have other channels than it.
-
-    Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.
-    """
+    """A sentence for each way in which recordings have other names or units than the library; kinds are alike."""
     from kineme.movements.channels import detect
 
     def name_of(channel: Any) -> str:

@@ -93,10 +93,7 @@ class _Part(NamedTuple):
 
 
 def robot_layout(path: Path) -> RobotLayout | None:
-    """Tell the layout of a file, or of the first file in a folder; None of any other, and of what is damaged.
-
-    A `DataError` says which package is missing to tell.
-    """
+    """Tell the layout of a file, or of the first in a folder; None of others, a `DataError` if a package is missing."""
     try:
         for source in _sources(path)[:1]:
             if source.suffix.lower() in HDF5:

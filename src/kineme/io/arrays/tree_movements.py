@@ -22,7 +22,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, movements_in
+from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, Style, TreeMovement, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -106,10 +106,7 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
     if len(movements) == 1 and not isinstance(layout.units, float | int):
-        raise DataError(
-            "expected times beside the positions, got one array alone; say the seconds between two samples with "
-            "units=, in the shell --units"
-        )
+        raise DataError(f"expected times beside the positions, got one array alone{SAY_STEP}")
     check_expanded(
         8 * sum(int(np.prod(movement.entries[""].shape)) for movement in movements if "" in movement.entries)
     )

@@ -30,6 +30,8 @@ _BESIDE_RATE = frozenset(
 )
 #: Head of the times that follow from a rate.
 STAMP = "time [s]"
+#: What to do where nothing says when samples were taken.
+SAY_STEP = "; say the seconds between two samples with units=, in the shell --units"
 _TIMES_OF = re.compile(r"(.+)[_./-](?:t|times?|time_?stamps?)|(?:t|times?|time_?stamps?)[_./-](.+)", re.IGNORECASE)
 #: Words of names that say how a file is built, not which movement it holds.
 _STRUCTURAL = frozenset(
@@ -64,10 +66,7 @@ class Rate(NamedTuple):
     def stamps(self, n: int) -> Any:
         """Return the times [s] of n samples."""
         if math.isnan(self.hertz):
-            raise DataError(
-                f"expected one rate, got {self.name}; say the seconds between two samples with units=, in the shell "
-                "--units"
-            )
+            raise DataError(f"expected one rate, got {self.name}{SAY_STEP}")
         return np.arange(n) / self.hertz
 
 

@@ -137,22 +137,11 @@ def labels_in_order(labels: Iterable[str | None]) -> list[str | None]:
 
 
 def _summary(label: str | None, chosen: NDArray[np.intp], measures: Measures) -> LabelSummary:
-    gaps = measures.gaps[chosen]
-    return LabelSummary(
-        label,
-        len(chosen),
-        _range(measures.samples[chosen].astype(float)),
-        _range(measures.durations[chosen]),
-        _range(measures.rates[chosen]),
-        _range(measures.extents[chosen]),
-        float(np.median(measures.jitters[chosen])),
-        int(gaps.sum()),
-        float(measures.longest[chosen][gaps > 0].max(initial=0.0)),
-    )
-
-
-def _range(values: Array) -> Range:
-    return Range(float(values.min()), float(np.median(values)), float(values.max()))
+    gaps, jitter = measures.gaps[chosen], float(np.median(measures.jitters[chosen]))
+    several = [x[chosen] for x in (measures.samples, measures.durations, measures.rates, measures.extents)]
+    samples, duration, rate, extent = (Range(float(x.min()), float(np.median(x)), float(x.max())) for x in several)
+    longest = float(measures.longest[chosen][gaps > 0].max(initial=0.0))
+    return LabelSummary(label, len(chosen), samples, duration, rate, extent, jitter, int(gaps.sum()), longest)
 
 
 def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str]:

@@ -301,10 +301,7 @@ def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretc
 
 
 def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
-    """Return the stretches of recordings that a table labels, as movements of their own; see `stretches_of`.
-
-    Rows of none are problems; a `DataError` says that all are.
-    """
+    """Return the stretches of recordings that a table labels, see `stretches_of`, as movements of their own."""
     stretches, problems = stretches_of(recordings, table)
     if not stretches:
         raise DataError(

@@ -346,7 +346,7 @@ class NameRule:
         if not read.block.labels:
             return read
         by_folder, person = self.label_by not in {None, TASK}, None
-        label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if by_folder else None
+        label = _folder(path, 1 if self.label_by == FOLDER else int(self.label_by or 1)) if by_folder else None
         if self.label_pattern is not None:
             depth = self.label_pattern.count("/") + 1
             name = "/".join(_parts(path, depth)[-depth:])
@@ -392,9 +392,8 @@ def match(parts: tuple[Part, ...], name: str) -> dict[str, str] | None:
     return None if values is None else dict(zip([part.field for part in parts if part.field], values, strict=True))
 
 
-def _folder(path: Path, level: str | int | None) -> str | None:
+def _folder(path: Path, up: int) -> str | None:
     """Return the name of the folder so many levels up, or None above the topmost."""
-    up = int(level or 1)
     names = _parts(path, up + 1)
     return names[-1 - up] if len(names) > up else None
 
