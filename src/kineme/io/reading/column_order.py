@@ -54,10 +54,9 @@ def in_one_set(
                 else f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
             )
             problems.append(Problem(file.path, None, unlike))
+        elif own == ours:
+            same.append(file)
         else:
-            if own == ours:
-                same.append(file)
-                continue
             measured_in = tuple(unit or "" for unit in ours.units)
             detected = file.detected._replace(columns=ours.heads, measured_in=measured_in)
             try:

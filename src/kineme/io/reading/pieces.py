@@ -75,5 +75,5 @@ def _in_parts(entry: Entry, how: HowToRead, numbers: Collection[int] | None) -> 
         if not file.block.labels:
             yield from file.problems
             continue
-        recordings = merge_files([file], entry.name, (), layout.kinds, layout.skip, layout.by_number)
+        recordings = merge_files([file], entry.name, layout)
         yield trimmed(recordings) if how.trim else recordings

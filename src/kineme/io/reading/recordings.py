@@ -229,7 +229,7 @@ def read_entries(
             for file, entry in joined
         ]
     read += [rule.apply(file, entry.path) for file, entry in files]
-    recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
+    recordings = merge_files(read, in_words(places), layout, problems)
     recordings = replace(recordings, notes=(*recordings.notes, *notes))
     return trimmed(recordings) if trim else recordings
 
@@ -272,10 +272,11 @@ def read_recording(path: str | Path) -> Trajectory:
     if data_set_of(path) is None:
         format_of(path)
     path.stat()
-    read = read_file(path, name_of(path), Layout())
+    layout = Layout()
+    read = read_file(path, name_of(path), layout)
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    recordings = merge_files([read], str(path))
+    recordings = merge_files([read], str(path), layout)
     for problem in recordings.problems:
         raise problem.error(str(problem._replace(file=str(path))))
     if len(recordings) > 1:
