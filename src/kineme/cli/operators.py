@@ -23,8 +23,8 @@ _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
 @click.option("--error-rate", type=opts.Finite(0, 0.25), default=0.02, show_default=True,
               help="Share of facts that a sensor gets wrong.")  # fmt: skip
 @opts.heading("Output")
-@click.option("--output", "-o", type=opts.FILE, help="A .pddl file, with a .json file beside it that kineme plan reads; "
-              "the .json file alone; or an .xml file, a behavior tree.  [default: show a table]")  # fmt: skip
+@click.option("--output", "-o", type=opts.FILE, help="A .pddl file, with a .json file beside it that kineme plan "
+              "reads; the .json file alone; or an .xml file, a behavior tree.  [default: show a table]")  # fmt: skip
 @click.option("--format", "form", type=click.Choice([*_FORMATS.values()]), help="Where the ending does not say it.")
 @opts.json_option
 @opts.force_option

@@ -22,7 +22,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, Style, TreeMovement, movements_in
+from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, TreeMovement, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -33,7 +33,7 @@ from kineme.movements.trajectories.movements import axis_names
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
-def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
+def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, many: str = "refuse") -> Parsed:
     """Return the movements of a tree, see `kineme.io.arrays.trees`.
 
     Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they

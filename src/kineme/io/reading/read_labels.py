@@ -47,8 +47,7 @@ _NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels t
 class LabelRow(NamedTuple):
     """A row of a table of labels."""
 
-    # start and end: in seconds
-    start: float
+    start: float  # [s], and so is the end
     end: float
     label: str | None
     # recording and place: which recording, and which movement of it; empty where the table does not say
@@ -89,15 +88,11 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     labels = labeled or [k for k in others if names[k] and names[k] not in aside]
     if len(labels) != 1 and not labeled:
         raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
-    return Heads(
-        start,
-        end,
-        labels[0],
-        next((k for k, name in enumerate(names) if name in _RECORDINGS), None),
-        next((k for k, name in enumerate(names) if name in _PLACES), None),
-        (_unit_of(names[start]), _unit_of(names[end])),
-        "time - " in names[start],
+    recording, place = (
+        next((k for k, name in enumerate(names) if name in wanted), None) for wanted in (_RECORDINGS, _PLACES)
     )
+    units = _unit_of(names[start]), _unit_of(names[end])
+    return Heads(start, end, labels[0], recording, place, units, "time - " in names[start])
 
 
 def _is_time(name: str) -> bool:
