@@ -64,11 +64,8 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
         )
     written = _write(execution, robot, output, options)
     data = execution.to_dict() | {"written": [str(path) for path in written]}
-    say(
-        options["as_json"],
-        data,
-        lambda: "\n".join([to_text(execution.table()), *(f"wrote {printable(path)}" for path in written)]),
-    )
+    lines = (f"wrote {printable(path)}" for path in written)
+    say(options["as_json"], data, lambda: "\n".join([to_text(execution.table()), *lines]))
     if not execution.reached and (options["simulate"] or any(a.status == "refused" for a in execution.attempts)):
         click.get_current_context().exit(1)
 

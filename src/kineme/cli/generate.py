@@ -60,16 +60,11 @@ def generate(**options: Any) -> None:
     obstacles = options["obstacles"]
     if len({len(point) for point in obstacles}) > 1:
         raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
-    movement_options = MovementOptions(
-        start=None if options["start"] is None else np.array(options["start"]),
-        goal=None if options["goal"] is None else np.array(options["goal"]),
-        duration=options["duration"],
-        rate=options["rate"],
-        settle=options["settle"],
-        obstacles=np.array(obstacles) if obstacles else None,
-    )
+    given = {"start": options["start"], "goal": options["goal"], "obstacles": obstacles or None}
+    points = {name: None if point is None else np.array(point) for name, point in given.items()}
+    movement_options = MovementOptions(**points, **{name: options[name] for name in ("duration", "rate", "settle")})
     for name in ("start", "goal"):
-        checked_point(learned, getattr(movement_options, name), f"--{name}")
+        checked_point(learned, points[name], f"--{name}")
     movement = make(learned, movement_options)
     warn_of_bad_fit(learned)
     if movement_options.goal is not None and movement_options.settle is None:
