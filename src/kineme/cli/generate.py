@@ -61,7 +61,7 @@ def generate(**options: Any) -> None:
     if len({len(point) for point in obstacles}) > 1:
         raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
     given = {"start": options["start"], "goal": options["goal"], "obstacles": obstacles or None}
-    points = {name: None if point is None else np.array(point) for name, point in given.items()}
+    points: dict[str, Any] = {name: None if point is None else np.array(point) for name, point in given.items()}
     movement_options = MovementOptions(**points, **{name: options[name] for name in ("duration", "rate", "settle")})
     for name in ("start", "goal"):
         checked_point(learned, points[name], f"--{name}")
