@@ -9,7 +9,7 @@ import click
 
 from kineme.cli.options import FOLDER, GroupedCommand, force_option, heading, json_option, library_option, whole
 from kineme.cli.output import progress, write
-from kineme.cli.pieces import how_divided, in_pieces, pieces_options
+from kineme.cli.pieces import PIECES_OPTIONS, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, recordings_argument
 from kineme.io.records import needs
 from kineme.reporting.text import printable
@@ -34,8 +34,7 @@ def features(recordings: tuple[Any, ...], folder: Any, output: Path, **options: 
     Example: kineme features archive/ --library actions/ -o shards/ --workers 8
     """
     as_json, force = options.pop("as_json"), options.pop("force")
-    how = how_divided(options, recordings, always=True)
-    assert how is not None  # always
+    how = {name: options.pop(name) for name in PIECES_OPTIONS}
     in_pieces("features", recordings, output, how, {"reading": options}, folder, force=force, as_json=as_json)
 
 
