@@ -16,6 +16,8 @@ from kineme.cli.output import check_new, progress, say, table, unlisted
 from kineme.cli.pieces import SHOWN, UNFINISHED
 from kineme.reporting.text import counted, printable
 
+_NOT_DONE = ("missing", "stale", "failed", "strange")  # what may be wrong with a piece
+
 
 @click.command(cls=GroupedCommand, short_help="Check the parts of a large archive, and make one answer of them.")
 @click.argument("parts", type=FOLDER)
@@ -55,14 +57,11 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     found = checked(job, plan.pieces)
     data: dict[str, Any] = {
         "task": asked.task,
-        "pieces": {
-            "done": len(found.parts), "missing": len(found.missing), "stale": len(found.stale),
-            "failed": len(found.failed), "strange": len(found.strange),
-        },
+        "pieces": {"done": len(found.parts)} | {name: len(getattr(found, name)) for name in _NOT_DONE},
         "recordings": sum(part.recordings for _, part in found.parts),
         "seconds": sum(part.seconds for _, part in found.parts),
         "problems": [*map(str, plan.problems), *found.problems],
-    }  # fmt: skip
+    }
     words = [found.in_words()]
     if found.parts and (found.is_complete or partial):
         words.append(
