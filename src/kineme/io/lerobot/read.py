@@ -226,7 +226,6 @@ def whole_episodes(
         f"{f'episode {k}' if k >= 0 else 'frames without an episode_index'}: {reason}"
         for k, reason in sorted(wrong.items())
     ]
-    # Episodes without frames in shards that were read.
     absent = set(np.setdiff1d(declared.numbers, numbers).tolist())
     places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
     left_out += [
