@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
-from kineme.io.reading.recordings import NameRule, read_paths
+from kineme.io.reading.recordings import HowToRead, NameRule, read_paths
 from kineme.movements.tables.layout import Known, Layout
 
 BEGIN = 1_700_000_000.0  # s since 1970
@@ -191,7 +191,7 @@ def test_columns_of_a_joined_recording_are_those_that_are_chosen_or_known(folder
     table(alone, ["x", "y", "z"], clock(50, 0, 2), spatial(clock(50, 0, 2)).tolist())
     assert columns(alone, columns=["y", "x"]) == ["y", "x"]
     layout = Layout(reference=Known(columns=("Gyroscope.y", "Accelerometer.x")))
-    (one,) = read_paths([folder / "nod"], layout, NameRule(), join=True).demonstrations
+    (one,) = read_paths([folder / "nod"], HowToRead(layout, NameRule(), join=True)).demonstrations
     assert [channel.name for channel in one.channels] == ["Gyroscope.y", "Accelerometer.x"]
 
 

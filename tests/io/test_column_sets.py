@@ -11,7 +11,7 @@ import scipy.io
 
 import kineme
 from kineme.io.inspection.inspect import inspect
-from kineme.io.reading.recordings import NameRule, read_paths
+from kineme.io.reading.recordings import HowToRead, NameRule, read_paths
 from kineme.library.storage.source import known_sources
 from kineme.movements.channels.detect import name_of
 from kineme.movements.tables.layout import Layout
@@ -200,7 +200,7 @@ def test_a_library_of_converted_columns_recognizes_files_that_have_more(tmp_path
         sources = known_sources(library.store)
     assert sources.columns == ("x_mm", "y [mm]", "z_mm")
     table(tmp_path / "asked.csv", [*IN_WORDS, "volt"], np.column_stack([PATH, T]))
-    recordings = read_paths([tmp_path / "asked.csv"], Layout(reference=sources), NameRule())
+    recordings = read_paths([tmp_path / "asked.csv"], HowToRead(Layout(reference=sources), NameRule()))
     assert recordings.demonstrations.dimensions == sources.columns
     assert recordings.demonstrations[0].positions[-1, 1] == pytest.approx(1000.0)
 

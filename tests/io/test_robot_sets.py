@@ -16,7 +16,7 @@ import kineme
 from kineme.errors import DataError, SpecificationError
 from kineme.io.arrays.robot_sets import LAYOUTS, robot_episodes, robot_layout
 from kineme.io.arrays.zarr_arrays import zarr_arrays
-from kineme.io.reading.episodes import read_episodes
+from kineme.io.reading.episodes import holds_episodes, read_episodes
 from lerobot_sets import write_v3
 from robot_array_sets import LENGTHS, motion, write_aloha, write_buffer, write_robomimic, write_umi
 
@@ -43,6 +43,7 @@ def written(name, folder):
 def test_every_layout_is_known_and_read_by_the_one_door(name, tmp_path):
     path = written(name, tmp_path)
     assert robot_layout(path).name == name
+    assert holds_episodes(path)
     episodes = list(read_episodes(path))
     assert [episode.number for episode in episodes] == [0, 1, 2]
     assert [len(episode) for episode in episodes] == list(LENGTHS)
@@ -55,6 +56,12 @@ def test_every_layout_is_known_and_read_by_the_one_door(name, tmp_path):
     assert recordings.demonstrations.lengths.tolist() == list(LENGTHS)
     assert {how.layout for how, _ in recordings.detected} == {name}
     np.testing.assert_allclose(recordings.demonstrations.durations, [episode.times[-1] for episode in episodes])
+
+
+def test_only_data_sets_hold_episodes(tmp_path):
+    (tmp_path / "a.csv").write_text("time,x\n0,1\n")
+    assert holds_episodes(write_v3(tmp_path / "set", LENGTHS))
+    assert not any(map(holds_episodes, (tmp_path, tmp_path / "a.csv", tmp_path / "none")))
 
 
 def test_robomimic_says_its_rate_its_task_and_its_subsets(tmp_path):

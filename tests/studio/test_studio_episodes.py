@@ -410,8 +410,7 @@ def test_a_feature_that_is_no_movement_hides_no_other(client):
 
 
 def test_episodes_that_are_files_of_their_own_are_named_so(tmp_path, monkeypatch):
-    layout = opened_module.EPISODE_LAYOUTS[0]._replace(fits=lambda path: True)
-    monkeypatch.setattr(opened_module, "EPISODE_LAYOUTS", (layout,))
+    monkeypatch.setattr(opened_module, "holds_episodes", lambda path: True)
     episodes = [Episode(k, np.arange(9.0), {"a": np.zeros((9, 2))}, {"a": ("x", "y")}, place=f"{k}.h5") for k in (0, 1)]
     monkeypatch.setattr(opened_module, "read_episodes", lambda path: iter(episodes))
     (tmp_path / "0.h5").write_bytes(b"")

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import FOLDER, Parsed, json_option, library_option, whole
+from kineme.cli.options import FOLDER, Parsed, json_option, library_option, opened, whole
 from kineme.cli.output import ask, confirm, say, table, write
-from kineme.errors import KinemeError
+from kineme.errors import DataError, KinemeError
 from kineme.reporting.text import counted, printable
 
 HELP = """\
@@ -67,14 +67,13 @@ def anchor(folder: Any, **options: Any) -> None:
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
-    from kineme.library.library import ActionLibrary
     from kineme.library.proposals import Recognized, assign_recognized, propose, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
     names = _names(options["names"])
     writes = scripted or interactive
-    with ActionLibrary(folder, read_only=not writes) as library:
+    with opened(folder, read_only=not writes) as library:
         # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
         # listed and when it is accepted.
         joining = recognized(library.store) if options["join"] else Recognized()
@@ -115,7 +114,6 @@ def anchor(folder: Any, **options: Any) -> None:
 
 
 def _names(path: Path | None) -> dict[int, str]:
-    from kineme.errors import DataError
     from kineme.library.storage.symbols import check_name
 
     if path is None:

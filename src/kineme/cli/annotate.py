@@ -61,7 +61,6 @@ def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, for
     from kineme.io.reading.formats import expanded
     from kineme.io.writing.annotations import copied_as_read, is_in_place, targets_of, to_csv, write_annotations
     from kineme.io.writing.rerun import recording_scenes, write_rerun
-    from kineme.library.library import ActionLibrary
 
     as_json, as_csv, force, rerun, error_rate = (
         options.pop(name) for name in ("as_json", "as_csv", "force", "rerun", "error_rate")
@@ -90,7 +89,7 @@ def annotate(recordings: tuple[Path, ...], folder: Any, output: Path | None, for
                 )
 
     check_copied = copied_as_read(output, sources, form)
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         held: list[Any] | None = None if rerun is None else []
         answer = _annotated(library, recordings, options, error_rate, check, held)
     if output is not None and answer.streamed:
@@ -138,10 +137,7 @@ def _annotated(
     check: Callable[..., None],
     held: list[Any] | None,
 ) -> _Answer:
-    """Annotate recordings piece by piece, once `check` has seen what is known of the first one.
-
-    Pieces are kept with their annotations in `held`, for a picture of them, unless it is None.
-    """
+    """Annotate recordings piece by piece, once `check` has seen what is known of the first; all are added to `held`."""
     from kineme.io.reading.recordings import paths_of
     from kineme.io.records import Problem
     from kineme.library.annotate import annotate_by

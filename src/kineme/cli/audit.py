@@ -22,16 +22,14 @@ from kineme.reporting.text import printable
 @click.option(
     "--rate", type=opts.Finite(0, min_open=True), help="Samples per second, where the data set does not say it."
 )
-@opts.under(
-    "Output",
-    click.option(
-        "--output", "-o", type=click.Path(path_type=Path),
-        help="One HTML page: the verdict, a strip of each flagged episode; of a large archive, a folder of parts.",
-    ),
-    click.option(
-        "--train-mask", "mask", type=opts.FILE,
-        help="Which episodes to train on: a .csv table, or a .json list of the numbers of those that are kept.",
-    ),
+@opts.heading("Output")
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path),
+    help="One HTML page: the verdict, a strip of each flagged episode; of a large archive, a folder of parts.",
+)  # fmt: skip
+@click.option(
+    "--train-mask", "mask", type=opts.FILE,
+    help="Which episodes to train on: a .csv table, or a .json list of the numbers of those that are kept.",
 )  # fmt: skip
 @opts.rerun_option
 @opts.json_option

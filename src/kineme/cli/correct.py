@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FILE, GroupedCommand, error_rate_option, json_option, library_option
+from kineme.cli.options import FILE, GroupedCommand, error_rate_option, json_option, library_option, opened
 from kineme.cli.output import progress, say, stretch_cells, table, unlisted
 from kineme.cli.reading import layout_options, pieces, problem_lines, recordings_argument
 from kineme.reporting.text import counted, printable
@@ -43,12 +43,11 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     from kineme.io.reading.formats import root_of
     from kineme.io.reading.read_labels import read_labels
     from kineme.library.correct import corrections_of, learn_corrections
-    from kineme.library.library import ActionLibrary
 
     as_json, dry_run, error_rate = (options.pop(name) for name in ("as_json", "dry_run", "error_rate"))
     corrected, annotated = options.pop("corrected"), options.pop("annotated")
     table_of = read_labels(corrected or _beside(recordings))
-    with ActionLibrary(folder, read_only=dry_run) as library:
+    with opened(folder, read_only=dry_run) as library:
         parsed = _recordings(recordings, options, library, [row.place for row in table_of.rows])
         before = (
             read_labels(annotated) if annotated is not None else _annotated(recordings, parsed, library, error_rate)

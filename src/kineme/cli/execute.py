@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from kineme.cli import options as opts
-from kineme.cli.output import check_new, say
+from kineme.cli.output import check_new, say, to_json
 from kineme.reporting.text import printable
 
 _SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "stop_at_each_step", "plot", "view")  # of what moves
@@ -48,7 +48,6 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
 
     Example: kineme execute plan.json --library actions/ --robot panda --simulate --disturb push:0,30,0@1.5 -o run.json
     """
-    from kineme.library.library import ActionLibrary
     from kineme.planning.execution import check_steps
     from kineme.planning.plan import read_plan
     from kineme.reporting.table import to_text
@@ -57,7 +56,7 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
     _check_options(plan, output, options)
     steps = read_plan(plan)
     robot = load(options["robot"], options["tip"])
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         execution = (
             _simulated(steps, library, robot, options)
             if options["simulate"]
@@ -65,11 +64,8 @@ def execute(plan: Path, folder: Any, output: Path | None, **options: Any) -> Non
         )
     written = _write(execution, robot, output, options)
     data = execution.to_dict() | {"written": [str(path) for path in written]}
-    say(
-        options["as_json"],
-        data,
-        lambda: "\n".join([to_text(execution.table()), *(f"wrote {printable(path)}" for path in written)]),
-    )
+    lines = (f"wrote {printable(path)}" for path in written)
+    say(options["as_json"], data, lambda: "\n".join([to_text(execution.table()), *lines]))
     if not execution.reached and (options["simulate"] or any(a.status == "refused" for a in execution.attempts)):
         click.get_current_context().exit(1)
 
@@ -101,7 +97,6 @@ def _simulated(plan: Any, library: Any, robot: Any, options: dict[str, Any]) -> 
 
 
 def _write(execution: Any, robot: Any, output: Path | None, options: dict[str, Any]) -> list[Path]:
-    from kineme.cli.output import to_json
     from kineme.reporting.atomic import write_atomically
 
     report, written = f"{to_json(execution.to_dict())}\n".encode(), []

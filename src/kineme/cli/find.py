@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import GroupedCommand, error_rate_option, force_option, heading, json_option, library_option
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, progress, say, stretch_cells, table, unlisted
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import files_of, layout_options, problem_lines, recordings_argument
@@ -16,20 +16,20 @@ from kineme.reporting.text import counted, printable
 _SHOWN = 20  # hits, and problems, that are listed; --output and --json have all
 
 
-@click.command(cls=GroupedCommand, short_help="Find where recordings show a symbol, the surest first.")
+@click.command(cls=opts.GroupedCommand, short_help="Find where recordings show a symbol, the surest first.")
 @click.argument("symbol")
 @recordings_argument
-@library_option
+@opts.library_option
 @click.option("--also", multiple=True, metavar="SYMBOL", help="Another symbol to find; may be repeated.")
-@error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
+@opts.error_rate_option("The smaller, the more a movement may differ from those of its symbol.")
 @layout_options
-@heading("Output")
+@opts.heading("Output")
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path),
     help="A table of all hits to write, .csv or .json; of a large archive, the folder of the parts.",
 )  # fmt: skip
-@json_option
-@force_option
+@opts.json_option
+@opts.force_option
 @pieces_options
 def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str, ...], **options: Any) -> None:
     """Find where RECORDINGS, files, folders, data sets or patterns of them, show SYMBOL, the surest hits first.
@@ -43,14 +43,13 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str
     """
     from kineme.io.writing.annotations import as_row, writer_of
     from kineme.library import annotate as search
-    from kineme.library.library import ActionLibrary
     from kineme.recognition.answer import certainty
 
     as_json, force, error_rate, output = (options.pop(name) for name in ("as_json", "force", "error_rate", "output"))
     how = how_divided(options, recordings)
     symbols = (symbol, *also)
     if how is not None:
-        with ActionLibrary(folder, read_only=True) as library:
+        with opts.opened(folder) as library:
             search.check_symbols(library.store, symbols)
         asked = {"reading": options, "error_rate": error_rate, "symbols": list(symbols)}
         in_pieces("find", recordings, output, how, asked, folder, force=force, as_json=as_json)
@@ -59,7 +58,7 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str
     writer = None if output is None else writer_of(output, None, [])
     if writer is not None and not writer.several:
         raise click.UsageError(f"expected a table to write, .csv or .json, got {printable(output)}")
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         search.check_symbols(library.store, symbols)
         with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:
             occurrences = search.find(

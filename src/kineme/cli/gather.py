@@ -11,10 +11,12 @@ import click
 
 from kineme.cli.audit import AuditFiles, audit_text
 from kineme.cli.learn import joined_since, learned_text, named_of
-from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option
+from kineme.cli.options import FILE, FOLDER, GroupedCommand, force_option, heading, json_option, opened
 from kineme.cli.output import check_new, progress, say, table, unlisted
 from kineme.cli.pieces import SHOWN, UNFINISHED
 from kineme.reporting.text import counted, printable
+
+_NOT_DONE = ("missing", "stale", "failed", "strange")  # what may be wrong with a piece
 
 
 @click.command(cls=GroupedCommand, short_help="Check the parts of a large archive, and make one answer of them.")
@@ -55,14 +57,11 @@ def gather(parts: Path, partial: bool, output: Path | None, mask: Path | None, a
     found = checked(job, plan.pieces)
     data: dict[str, Any] = {
         "task": asked.task,
-        "pieces": {
-            "done": len(found.parts), "missing": len(found.missing), "stale": len(found.stale),
-            "failed": len(found.failed), "strange": len(found.strange),
-        },
+        "pieces": {"done": len(found.parts)} | {name: len(getattr(found, name)) for name in _NOT_DONE},
         "recordings": sum(part.recordings for _, part in found.parts),
         "seconds": sum(part.seconds for _, part in found.parts),
         "problems": [*map(str, plan.problems), *found.problems],
-    }  # fmt: skip
+    }
     words = [found.in_words()]
     if found.parts and (found.is_complete or partial):
         words.append(
@@ -156,14 +155,13 @@ def _inspected(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, d
 
 def _learned(asked: Any, tables: Callable[..., Iterable[Any]], files: Files, data: dict[str, Any]) -> str:
     """Store all movements in the library, in the order of the archive."""
-    from kineme.library.library import ActionLibrary
     from kineme.pieces.learned import learned, survey
 
     if files.output is not None or files.mask is not None:
         raise click.UsageError("expected no --output and no --train-mask, learn stores movements in its library")
     of = survey(tables, asked, data["problems"])
     data["notes"] = list(of.notes)
-    with ActionLibrary(asked.options["library"]) as library, progress(total=of.rows, desc="learning") as bar:
+    with opened(asked.options["library"], read_only=False) as library, progress(total=of.rows, desc="learning") as bar:
         before, n = library.version, 0
         totals: Counter[str] = Counter()
         symbols: dict[str, None] = {}

@@ -11,6 +11,7 @@ from kineme.cli.options import FOLDER, GroupedCommand, error_rate_option, force_
 from kineme.cli.output import progress, say
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.errors import DataError, KinemeError
 
 
 @click.command(cls=GroupedCommand, explains_reading=True, short_help="Summarize a set of recordings.")
@@ -39,16 +40,7 @@ def inspect(
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
-    from kineme.errors import DataError
-    from kineme.io.inspection.inspect import (
-        as_data,
-        as_words,
-        contents_as_data,
-        contents_as_words,
-        contents_of_all,
-        nothing_read,
-    )
-    from kineme.io.inspection.inspect import inspect as summarize
+    from kineme.io.inspection import inspect as summaries
     from kineme.io.reading.formats import in_words
 
     how, output, force = how_divided(options, recordings), options.pop("output"), options.pop("force")
@@ -58,7 +50,7 @@ def inspect(
     if output is not None:
         raise click.UsageError("expected --output with --workers, --scheduler or --shard; for a picture say --plot")
     files = [recording for recording in recordings if str(recording) != "-"]
-    contents = contents_of_all(files, options["follow_links"])
+    contents = summaries.contents_of_all(files, options["follow_links"])
     unlike: tuple[int, ...] = ()
     recorded: Any = None
     inspections: dict[str, Any] = {}
@@ -67,11 +59,11 @@ def inspect(
     except DataError as error:
         if not contents or plot is not None:
             raise
-        summary = nothing_read(in_words(recordings), str(error))
+        summary = summaries.nothing_read(in_words(recordings), str(error))
         texts = [f"not read: {error}"]
     else:
-        summary = summarize(recorded)
-        texts = [as_words(summary)]
+        summary = summaries.inspect(recorded)
+        texts = [summaries.as_words(summary)]
         if outliers:
             unlike, inspections, words = _outliers(recorded, error_rate)
             texts += [words] if words else []
@@ -80,15 +72,15 @@ def inspect(
             from kineme.reporting.figures import save_figure
 
             save_figure(draw_recordings(recorded, unlike), plot)
-    data = as_data(summary) | inspections | ({"contents": contents_as_data(contents)} if contents else {})
-    say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
+    data = summaries.as_data(summary) | inspections
+    data |= {"contents": summaries.contents_as_data(contents)} if contents else {}
+    say(as_json, data, lambda: "\n\n".join([*summaries.contents_as_words(contents), *texts]))
     if recorded is None:
         click.get_current_context().exit(1)
 
 
 def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[str, Any], str]:
     """Indices of the outliers; what is said of them as data, and in words."""
-    from kineme.errors import KinemeError
     from kineme.recognition.outliers import find_outliers, outliers_as_data, outliers_as_words
 
     names = recorded.short_names

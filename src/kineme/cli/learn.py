@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FOLDER, GroupedCommand, force_option, json_option, library_option
+from kineme.cli.options import FOLDER, GroupedCommand, force_option, json_option, library_option, opened
 from kineme.cli.output import progress, say
 from kineme.cli.pieces import how_divided, in_pieces, pieces_options
 from kineme.cli.reading import layout_options, problem_lines, read, recordings_argument
@@ -56,9 +56,9 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
+    from kineme.io.inspection.inspect import notes_on_heads, notes_on_samples
     from kineme.io.reading.formats import root_of
     from kineme.library.learn import learn_recordings
-    from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
     person, by_person, table = options.pop("person"), options.pop("by_person"), options.pop("table")
@@ -82,7 +82,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     root = root_of(*(path for path in recordings if str(path) != "-"))
     people = _people(root, parsed, person, by_person)
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
-    with ActionLibrary(folder, create=True) as library:
+    with opened(folder, create=True) as library:
         before = library.version
         with progress(total=len(parsed), desc="learning", unit="movement") as bar:
             report = learn_recordings(
@@ -99,7 +99,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "people": sorted({name for name in people or () if name is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
-            "notes": _notes(parsed),
+            "notes": [*parsed.notes, *notes_on_heads(parsed), *notes_on_samples(parsed)],
         }
     say(as_json, data, lambda: learned_text(data, problem_lines(parsed.problems, "left out ")))
 
@@ -120,21 +120,6 @@ def _of_pieces(
         raise click.UsageError("expected --person, or people from --person-column or --label-pattern, not both")
     given = {name: value for name, value in said.items() if value not in (None, False)}
     return given | {"reading": reading} | ({"several": True} if len(recordings) > 1 else {})
-
-
-def _notes(recordings: Any) -> list[str]:
-    """List what a person should know of how recordings were read, before they rely on what is learned."""
-    from kineme.io.inspection.inspect import notes_on_extents, notes_on_points, notes_on_sizes
-    from kineme.io.reading.column_order import notes_on_aside, notes_on_order
-    from kineme.io.reading.merge_files import notes_on_gaps, notes_on_sampling
-    from kineme.movements.channels.column_match import columns_recorded
-
-    demos = recordings.demonstrations
-    aside = notes_on_aside(how for how, _ in recordings.detected)
-    ordered = notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
-    repaired = [*notes_on_gaps(recordings), *notes_on_sampling(recordings)]
-    of_columns = [*notes_on_points(demos), *notes_on_sizes(demos), *notes_on_extents(demos)]
-    return [*recordings.notes, *aside, *ordered, *repaired, *of_columns]
 
 
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:

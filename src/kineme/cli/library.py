@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FILE, ID, SymbolName, json_option, library_option, whole
+from kineme.cli.options import FILE, ID, SymbolName, json_option, library_option, opened, whole
 from kineme.cli.output import confirm, in_words, say, table, to_json
 from kineme.reporting.text import counted, printable
 
@@ -20,13 +20,6 @@ from kineme.reporting.text import counted, printable
 @click.group()
 def library() -> None:
     """Show and edit an action library."""
-
-
-def opened(folder: Any, *, read_only: bool = True) -> Any:
-    """Open the library in a folder."""
-    from kineme.library.library import ActionLibrary
-
-    return ActionLibrary(folder, read_only=read_only)
 
 
 _Answer = tuple[Any, Callable[[], str]]

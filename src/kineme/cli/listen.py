@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, Parsed, given_options, heading, library_option, under
+from kineme.cli.options import Finite, GroupedCommand, Parsed, given_options, heading, library_option, opened, under
 from kineme.cli.output import write
 from kineme.reporting.text import printable
 
@@ -74,14 +74,14 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     if useless := given_options(every - used):
         raise click.UsageError(f"expected --from or --to with the protocol of {', '.join(useless)}")
 
-    def opened(_: Any) -> list[Any]:
+    def connected(_: Any) -> list[Any]:
         receivers = [
             adapter.sink(**{name: options[name] for name in adapter.gives}, same_clock=protocol == source)
             for protocol, adapter in outward.items()
         ]
         return [inward.source(**{name: options[name] for name in inward.takes}), *receivers]
 
-    _run(folder, options, opened)
+    _run(folder, options, connected)
 
 
 @click.command(cls=GroupedCommand, short_help="Name the movements of a topic of ROS 2; move an arm.")
@@ -111,7 +111,7 @@ def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> No
     if (topic is None) == (frame is None):
         raise click.UsageError("expected one of --topic and --frame")
 
-    def opened(library: Any) -> list[Any]:
+    def connected(library: Any) -> list[Any]:
         from kineme.planning.preview import plan_symbol
         from kineme.robots.models.robot import load
         from kineme.sensors.ros import ArmClient, RosNode
@@ -123,20 +123,19 @@ def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> No
         plan = partial(plan_symbol, library, robot)
         return [node, node, ArmClient(node, robot.joints, plan, options["action"])]
 
-    _run(folder, options, opened)
+    _run(folder, options, connected)
 
 
-def _run(folder: Any, options: dict[str, Any], opened: Callable[[Any], list[Any]]) -> None:
-    """Listen to the source that is opened first, with the sinks behind it, until Ctrl-C; say what it was."""
-    from kineme.library.library import ActionLibrary
+def _run(folder: Any, options: dict[str, Any], connected: Callable[[Any], list[Any]]) -> None:
+    """Listen to the source that is connected first, with the sinks behind it, until Ctrl-C; say what it was."""
     from kineme.sensors.listen import Listener, listen
 
     def tell(sentence: str) -> None:
         write(f"kineme: {printable(sentence)}", err=True)
 
-    with ActionLibrary(folder, read_only=True) as library:
+    with opened(folder) as library:
         listener = Listener(library, tell, options["rest"], options["columns"])
-        source, *sinks = opened(library)
+        source, *sinks = connected(library)
         sinks.append(_Screen(options["as_json"], options["only_ended"]))
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
         try:

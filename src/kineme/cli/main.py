@@ -17,22 +17,19 @@ from kineme.cli.correct import correct
 from kineme.cli.discover import discover
 from kineme.cli.evaluate import evaluate, reproduce
 from kineme.cli.execute import execute
-from kineme.cli.export import export
-from kineme.cli.features import features
 from kineme.cli.find import find
 from kineme.cli.gather import gather
-from kineme.cli.generate import generate
+from kineme.cli.generate import export, generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.listen import listen, ros
 from kineme.cli.move import move
-from kineme.cli.operators import operators
+from kineme.cli.operators import operators, plan
 from kineme.cli.output import write
-from kineme.cli.plan import plan
 from kineme.cli.recognize import recognize, why
 from kineme.cli.segment import segment
-from kineme.cli.serve import serve
+from kineme.cli.shards import features, serve
 from kineme.cli.skills import skills
 from kineme.cli.studio import page, studio
 from kineme.errors import KinemeError
@@ -43,10 +40,7 @@ _BROKEN_PIPE = 128 + 13  # as a shell says it of a tool that the signal ends
 
 
 class _OneLineErrors(click.Group):
-    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback.
-
-    A reader that has gone is no error to speak of: the command ends without a word.
-    """
+    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):

@@ -191,17 +191,8 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
             "expected --at with --goal: where the movement starts; or --as-recorded; or --joints, where the columns "
             "are joints of the arm"
         )
-    generated = generate_at(
-        learned,
-        options["at"],
-        options["goal"],
-        options["duration"],
-        scale=options["scale"],
-        rate=options["rate"],
-        joints=robot if space == "joints" else None,
-        joint_units=options["joint_units"],
-        plane=options["plane"],
-    )
+    chosen = {name: options[name] for name in ("goal", "duration", "scale", "rate", "joint_units", "plane")}
+    generated = generate_at(learned, options["at"], joints=robot if space == "joints" else None, **chosen)
     is_placed = options["at"] or options["as_recorded"] or space == "joints"
     return move_robot(
         generated.movement,

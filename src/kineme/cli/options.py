@@ -151,10 +151,9 @@ class SymbolName(click.ParamType):  # type: ignore[type-arg]
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Names and ids that begin with the typed text; none without a library, and never an error."""
         from kineme.errors import KinemeError
-        from kineme.library.library import ActionLibrary
 
         if folder := ctx.params.get("folder") or ctx.lookup_default("folder"):
-            with suppress(KinemeError, OSError), ActionLibrary(folder, read_only=True) as library:
+            with suppress(KinemeError, OSError), opened(folder) as library:
                 names = (symbol.name if _PLAIN.fullmatch(symbol.name) else symbol.id for symbol in library.symbols())
                 return [CompletionItem(name) for name in names if name.startswith(incomplete)]
         return []
@@ -174,6 +173,13 @@ class LibraryLocation(click.Path):
         from kineme.library.storage.address import as_location
 
         return as_location(value)
+
+
+def opened(folder: Any, **options: Any) -> Any:
+    """Open the library in a folder; options are those of `ActionLibrary`, by default it is only read."""
+    from kineme.library.library import ActionLibrary
+
+    return ActionLibrary(folder, **(options or {"read_only": True}))
 
 
 def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:

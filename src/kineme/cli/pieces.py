@@ -55,13 +55,13 @@ pieces_options = under(
 PIECES_OPTIONS: tuple[str, ...] = ("workers", "scheduler", "shard", "piece_size", "time_limit")
 
 
-def how_divided(options: dict[str, Any], recordings: Sequence[Any], *, always: bool = False) -> dict[str, Any] | None:
+def how_divided(options: dict[str, Any], recordings: Sequence[Any]) -> dict[str, Any] | None:
     """Take the options of pieces out of all, and return them; None where the command is to read everything itself."""
     from kineme.pieces.archive import is_remote
 
     how = {name: options.pop(name) for name in PIECES_OPTIONS}
     asked = any(how[name] is not None for name in PIECES_OPTIONS[:3]) or any(map(is_remote, map(str, recordings)))
-    return how if asked or always else None
+    return how if asked else None
 
 
 def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
@@ -135,10 +135,7 @@ def in_pieces(  # noqa: PLR0913 - what a command knows when it hands its work on
 
 
 def _of_library(folder: Any, task: str, output: Path, force: bool) -> dict[str, Any]:
-    """The options that say which library parts depend on; to learn, it is created if it does not exist.
-
-    Features depend on its specification, and on bases that are fitted once and lie beside the shards.
-    """
+    """The options that say which library parts depend on; to learn, it is created if it does not exist."""
     from kineme.library.library import ActionLibrary, is_library
     from kineme.library.storage.address import Address, as_location
     from kineme.pieces.shards import shared_reduction

@@ -12,7 +12,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, under
+from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, opened, under
 from kineme.cli.output import progress
 from kineme.reporting.text import first_names, printable
 
@@ -138,26 +138,15 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
-    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
-
-    Topics of a bag and columns that are not asked for are those of `library`, where a file has them.
-    """
+    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`."""
     from kineme.io.limits import read_limited
     from kineme.io.reading.recordings import read_paths
 
-    layout, rule, how, join = _how(options, library)
     several = [paths] if isinstance(paths, Path) else list(paths)
     files = [path for path in several if str(path) != "-"]
     given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
-    return read_paths(
-        files,
-        layout,
-        rule,
-        **how,
-        join=join,
-        progress=lambda paths: progress(paths, desc="reading", unit="file"),
-        standard_input=given,
-    )
+    reading = partial(progress, desc="reading", unit="file")
+    return read_paths(files, _how(options, library), reading, given)
 
 
 def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
@@ -169,16 +158,12 @@ def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places:
 
 
 def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
-    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them.
-
-    Of data sets, the episodes at these `places` alone, if there are any.
-    """
+    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them."""
     from kineme.io.reading.pieces import read_pieces
 
     if any(str(path) == "-" for path in paths):
         raise click.UsageError("expected files or folders to search, got the standard input")
-    layout, rule, how, _ = _how(options, library)
-    return read_pieces(paths, layout, rule, **how, places=places)
+    return read_pieces(paths, _how(options, library), places)
 
 
 def seconds_of(paths: Sequence[Path]) -> float | None:
@@ -202,7 +187,7 @@ def _data_sets(paths: Sequence[Path]) -> list[Path] | None:
 
 
 def _how(options: dict[str, Any], library: Any) -> Any:
-    """The layout and the rule of names that the `layout_options` say, the switches, and whether files are joined."""
+    """What the `layout_options` say, with what the library has learned."""
     from kineme.io.reading.recordings import how_to_read
 
     reference = None
@@ -214,10 +199,7 @@ def _how(options: dict[str, Any], library: Any) -> Any:
 
 
 def notes_beside(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
-    """A sentence for each thing to know of recordings that are compared with a library, whose channels are `learned`.
-
-    For topics, frames and columns that were read since it has them, for gaps, and for channels other than its own.
-    """
+    """A sentence for each thing to know of recordings beside those of a library, whose channels are `learned`."""
     from kineme.io.reading.merge_files import notes_on_gaps
     from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
@@ -255,9 +237,8 @@ def read_source(options: dict[str, Any]) -> Any:
                 f"columns and primitives are those that it was learned with; say {given[0]} to kineme learn"
             )
         from kineme.library.grounding import learned_of
-        from kineme.library.library import ActionLibrary
 
-        with ActionLibrary(options["folder"], read_only=True) as library:
+        with opened(options["folder"]) as library:
             return learned_of(library.store, source)
     from kineme.dmp.discrete.dmp import DMP
     from kineme.dmp.generation.generate import SAVED, Learned, learn_one, load_saved
@@ -279,9 +260,7 @@ def name_of_source(options: dict[str, Any]) -> str:
     source = options["source"]
     if not _is_symbol(source, options["folder"]):
         return Path(source).stem
-    from kineme.library.library import ActionLibrary
-
-    with ActionLibrary(options["folder"], read_only=True) as library:
+    with opened(options["folder"]) as library:
         return next((symbol.name for symbol in library.symbols() if symbol.id == source), str(source))
 
 
@@ -302,10 +281,7 @@ def _is_symbol(source: str, folder: Any) -> bool:
 
 
 def _differences(learned: Any, asked: Any) -> list[str]:
-    """A sentence for each way in which recordings that are compared with a library have other channels than it.
-
-    Other kinds are refused elsewhere; what differs here are names, units, and whether channels are known.
-    """
+    """A sentence for each way in which recordings have other names or units than the library; kinds are alike."""
     from kineme.movements.channels import detect
 
     def name_of(channel: Any) -> str:

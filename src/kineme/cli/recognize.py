@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import FILE, GroupedCommand, error_rate_option, force_option, json_option, library_option, whole
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, progress, say, table
 from kineme.cli.reading import layout_options, notes_beside, problem_lines, read, recordings_argument
 from kineme.reporting.text import printable
@@ -16,13 +16,13 @@ from kineme.reporting.text import printable
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
-@click.command(cls=GroupedCommand, short_help="Recognize recordings with the symbols of a library.")
+@click.command(cls=opts.GroupedCommand, short_help="Recognize recordings with the symbols of a library.")
 @recordings_argument
-@library_option
-@error_rate_option("Share of true movements that may be called unknown.")
-@click.option("--top", type=whole(1), default=3, show_default=True, help="Symbols listed per movement.")
+@opts.library_option
+@opts.error_rate_option("Share of true movements that may be called unknown.")
+@click.option("--top", type=opts.whole(1), default=3, show_default=True, help="Symbols listed per movement.")
 @layout_options
-@json_option
+@opts.json_option
 def recognize(
     recordings: tuple[Path, ...], folder: Any, error_rate: float, top: int, as_json: bool, **options: Any
 ) -> None:
@@ -41,9 +41,7 @@ def recognize(
 
     Example: kineme recognize *.csv --library actions/
     """
-    from kineme.library.library import ActionLibrary
-
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         parsed = read(recordings, options, library)
         answers = _recognized(library, parsed.demonstrations, error_rate)
         notes = notes_beside(parsed, options, library.channels)
@@ -100,15 +98,15 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     return "\n".join(lines + problems)
 
 
-@click.command(cls=GroupedCommand, short_help="Explain what a movement is recognized as.")
+@click.command(cls=opts.GroupedCommand, short_help="Explain what a movement is recognized as.")
 @recordings_argument
-@library_option
-@click.option("--index", type=whole(0), help="Number of the movement among several, from 0.  [default: the first]")
-@error_rate_option("Share of true movements that may be called unknown.")
+@opts.library_option
+@click.option("--index", type=opts.whole(0), help="Number of the movement among several, from 0.  [default: the first]")
+@opts.error_rate_option("Share of true movements that may be called unknown.")
 @layout_options
-@click.option("--output", "-o", type=FILE, help="The picture: a .png, .svg or .pdf file.")
-@json_option
-@force_option
+@click.option("--output", "-o", type=opts.FILE, help="The picture: a .png, .svg or .pdf file.")
+@opts.json_option
+@opts.force_option
 def why(
     recordings: tuple[Path, ...], folder: Any, index: int | None, error_rate: float, as_json: bool, **options: Any
 ) -> None:
@@ -120,12 +118,11 @@ def why(
 
     Example: kineme why new.csv --library actions/ -o why.png
     """
-    from kineme.library.library import ActionLibrary
     from kineme.reporting.figures import save_figure
 
     check_new(options["output"], options.pop("force"))
     output = options.pop("output")
-    with ActionLibrary(folder, read_only=True) as library:
+    with opts.opened(folder) as library:
         parsed = read(recordings, options, library)
         movements = parsed.demonstrations
         n, i = len(movements), index or 0

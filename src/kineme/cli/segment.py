@@ -2,51 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, GroupedCommand, flag_of, force_option, heading, json_option, plot_option, whole
+from kineme.cli import options as opts
 from kineme.cli.output import check_new, say, table
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.reporting.text import counted, printable
 
 #: Parameters of the methods: type, help.
 _PARAMETERS: dict[str, tuple[Any, str]] = {
-    "min_rest": (Finite(0), "rest: a shorter one is a pause within a movement, in seconds."),
-    "min_movement": (Finite(0), "rest, speed: a shorter one is a twitch, in seconds."),
-    "speed": (Finite(0), "rest: share of the peak speed below which the recording rests."),
-    "depth": (Finite(0), "speed: a minimum counts below this share of the peaks beside it."),
-    "turn": (Finite(0), "speed: also cut at turns sharper than this angle, in radians."),
-    "penalty": (Finite(0), "change-points: cost of one more piece."),
-    "n_pieces": (whole(1), "change-points: number of pieces."),
+    "min_rest": (opts.Finite(0), "rest: a shorter one is a pause within a movement, in seconds."),
+    "min_movement": (opts.Finite(0), "rest, speed: a shorter one is a twitch, in seconds."),
+    "speed": (opts.Finite(0), "rest: share of the peak speed below which the recording rests."),
+    "depth": (opts.Finite(0), "speed: a minimum counts below this share of the peaks beside it."),
+    "turn": (opts.Finite(0), "speed: also cut at turns sharper than this angle, in radians."),
+    "penalty": (opts.Finite(0), "change-points: cost of one more piece."),
+    "n_pieces": (opts.whole(1), "change-points: number of pieces."),
 }
 
 
-def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
-    for name, (kind, words) in reversed(_PARAMETERS.items()):
-        command = click.option(flag_of(name), type=kind, help=f"Of --by {words}")(command)
-    return command
+_parameters = opts.under(
+    "Options",
+    *(
+        click.option(opts.flag_of(name), type=kind, help=f"Of --by {words}")
+        for name, (kind, words) in _PARAMETERS.items()
+    ),
+)
 
 
-@click.command(cls=GroupedCommand, short_help="Cut long recordings into movements.")
+@click.command(cls=opts.GroupedCommand, short_help="Cut long recordings into movements.")
 @recordings_argument
 @click.option("--by", type=click.Choice(["rest", "speed", "change-points"]), default="rest", show_default=True,
               help="Cut at rests, at minima of speed, or at change points of the velocity.")  # fmt: skip
 @_parameters
-@heading("Output")
+@opts.heading("Output")
 @click.option(
     "--output", "-o", type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pieces, a file for each; it is created.  [default: show the table alone]",
 )  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["csv", "npz", "json"]), default="csv", show_default=True,
               help="Format of the pieces.")  # fmt: skip
-@plot_option
+@opts.plot_option
 @layout_options
-@json_option
-@force_option
+@opts.json_option
+@opts.force_option
 def segment(
     recordings: tuple[Path, ...], output: Path | None, by: str, form: str, plot: Path | None, **options: Any
 ) -> None:
@@ -93,8 +95,8 @@ def _check_parameters(by: str, chosen: dict[str, Any]) -> None:
     parameters = [field.name for field in fields(SEGMENTERS[by])]
     for name in chosen:
         if name not in parameters:
-            flags = ", ".join(map(flag_of, filter(_PARAMETERS.get, parameters)))
-            raise click.UsageError(f"expected parameters of --by {by}: {flags}; got {flag_of(name)}")
+            flags = ", ".join(map(opts.flag_of, filter(_PARAMETERS.get, parameters)))
+            raise click.UsageError(f"expected parameters of --by {by}: {flags}; got {opts.flag_of(name)}")
 
 
 def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> tuple[list[Any], list[Any]]:

@@ -10,8 +10,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.library import opened
-from kineme.cli.options import FOLDER, NUMBERS, SymbolName, library_option
+from kineme.cli.options import FOLDER, NUMBERS, SymbolName, library_option, opened
 from kineme.cli.output import write
 
 

@@ -10,8 +10,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.library import opened
-from kineme.cli.options import FILE, force_option, json_option, library_option, library_option_of, whole
+from kineme.cli.options import FILE, force_option, json_option, library_option, library_option_of, opened, whole
 from kineme.cli.output import check_new, say, write
 from kineme.reporting.text import printable
 

@@ -64,14 +64,14 @@ class Contents(NamedTuple):
 
 
 @contextmanager
-def damaged_as(said: str, *errors: type[Exception]) -> Iterator[None]:
-    """Raise what a package raises on damaged bytes as a `DataError` that begins so."""
+def damaged_as(said: str, *errors: type[Exception], remedy: str = "") -> Iterator[None]:
+    """Raise what a package raises on damaged bytes as a `DataError` that begins so, and ends with the remedy."""
     try:
         yield
     except KinemeError:
         raise
     except errors as error:
-        raise DataError(f"{said} ({error})") from error
+        raise DataError(f"{said} ({error}){remedy}") from error
 
 
 @contextmanager

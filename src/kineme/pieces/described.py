@@ -106,7 +106,7 @@ def _recordings(
 def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> Iterator[Recordings | Problem]:
     """Yield files as one set of recordings; one by one, if one that is unlike the others can be read alone."""
     if numbers is not None:
-        yield from read_entry(entries[0], how.layout, how.rule, **how.switches, numbers=numbers)
+        yield from read_entry(entries[0], how, numbers)
         return
     together = _set_of(entries, how)
     there = {source.path for source in together.sources} if isinstance(together, Recordings) else set[str]()
@@ -121,9 +121,7 @@ def _read(entries: Sequence[Entry], how: HowToRead, numbers: range | None) -> It
 
 def _set_of(entries: Sequence[Entry], how: HowToRead) -> Recordings | Problem:
     try:
-        return read_entries(
-            entries, how.layout, how.rule, follow_links=how.switches["follow_links"], trim=how.switches["trim"]
-        )
+        return read_entries(entries, how._replace(join=False))
     except (KinemeError, OSError) as error:
         name = entries[0].name
         return Problem(name, None, str(error).removeprefix(f"{entries[0].path}: ").removeprefix(f"{name}: "))

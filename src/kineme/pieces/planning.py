@@ -103,13 +103,13 @@ def plan(archive: str | Sequence[str], size: int = PIECE_BYTES, **reading: Any) 
     if size < 1:
         raise SpecificationError(f"expected a size of pieces of at least one byte, got {size}")
     archives = [archive] if isinstance(archive, str) else list(archive)
-    layout, _, switches, _ = how_to_read(reading)
-    units, problems = units_of(archives, switches["follow_links"])
+    how = how_to_read(reading)
+    units, problems = units_of(archives, how.follow_links)
     pieces: list[Piece] = []
     bundle: list[Unit] = []
     n_bytes = 0
     for unit in [*units, None]:
-        of_rows = [] if unit is None else _of_rows(unit, size, layout)
+        of_rows = [] if unit is None else _of_rows(unit, size, how.layout)
         is_new = unit is None or unit.marker or of_rows or (bundle and bundle[-1].archive != unit.archive)
         if bundle and (is_new or _is_complete(bundle, n_bytes, size)):
             pieces.append(Piece(bundle[0].archive, bundle[0].shown, bundle[-1].shown, tuple(bundle)))

@@ -201,13 +201,13 @@ def _write(path: Path, tables: Sequence[Any], metadata: Mapping[bytes, Mapping[s
 
 def recordings_of(source: Source, options: Mapping[str, Any], reference: Known | None = None) -> Iterator[Recordings]:
     """Yield the recordings of a piece as `read_recordings` reads them, file by file, or some episodes at a time."""
-    layout, rule, switches, join = how_to_read(options, reference)
-    if join:
+    how = how_to_read(options, reference)
+    if how.join:
         raise DataError("expected recordings that are read one by one, got --join-files; join them first")
     for unit in source.piece.units:
         with local_copy(unit) as folder:
             entry = Entry(folder / unit.name, Path(unit.name), unit.shown)
-            yield from noted(source, read_entry(entry, layout, rule, **switches, numbers=source.piece.numbers))
+            yield from noted(source, read_entry(entry, how, source.piece.numbers))
 
 
 def noted(source: Source, read: Iterable[Recordings | Problem]) -> Iterator[Recordings]:

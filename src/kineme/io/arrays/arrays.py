@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.arrays.trees import STAMP, rate_of, seconds_named
+from kineme.io.arrays.trees import SAY_STEP, STAMP, rate_of, seconds_named
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
@@ -213,10 +213,7 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
     if t is None and not isinstance(layout.units, float | int) and rate_of(arrays) is None:
         got = listed(arrays) if len(arrays) > 1 else f"positions of shape {x.shape} alone"
-        raise DataError(
-            f"expected times beside the positions, got {got}; say the seconds between two samples with units=, "
-            "in the shell --units"
-        )
+        raise DataError(f"expected times beside the positions, got {got}{SAY_STEP}")
     if t is not None and t.shape != x.shape[:1]:
         raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
     if "offsets" not in arrays:

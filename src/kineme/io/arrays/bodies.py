@@ -16,7 +16,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import first_named, numbers_of
-from kineme.io.arrays.trees import STAMP, Rate, rate_of
+from kineme.io.arrays.trees import SAY_STEP, STAMP, Rate, rate_of
 from kineme.movements.rotations import exp
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, distinct, no_lines
@@ -100,8 +100,7 @@ def _clock(arrays: Mapping[str, Any], body: Body, layout: Layout) -> tuple[dict[
     rate = rate_of(arrays)
     if rate is None:
         raise DataError(
-            f"expected the rate of {body.arrays[-1]} beside it, as mocap_framerate, fps or dt, got none; say the "
-            "seconds between two samples with units=, in the shell --units"
+            f"expected the rate of {body.arrays[-1]} beside it, as mocap_framerate, fps or dt, got none{SAY_STEP}"
         )
     return {STAMP: rate.stamps(body.n_samples)}, rate
 

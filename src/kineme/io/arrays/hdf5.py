@@ -39,13 +39,6 @@ def hdf5_file(path: Path) -> Iterator[Any]:
         yield file
 
 
-def hdf5_tree(group: Any) -> dict[str, Any]:
-    """Return a file or a group as a mapping of data sets that are not read yet, single values, and groups."""
-    import h5py
-
-    return _tree(group, h5py, [0])
-
-
 def hdf5_group(group: Any, name: str) -> Any:
     """Return a group within a group, or nothing where there is none, and where it lies in another file."""
     import h5py
@@ -54,9 +47,11 @@ def hdf5_group(group: Any, name: str) -> Any:
     return member if isinstance(member, Mapping) else {}
 
 
-def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
-    """Return a group, in the unit of that around it."""
-    tree: dict[str, Any] = {}
+def hdf5_tree(group: Any, counted: list[int] | None = None, depth: int = 0, unit: Any = None) -> dict[str, Any]:
+    """Return a file or a group as a mapping of data sets that are not read yet, single values, and groups."""
+    import h5py
+
+    tree, counted = dict[str, Any](), counted or [0]  # how many groups and data sets there are before it
     unit = _unit_in(group, group.attrs) or unit
     tree |= _label_and_rate(group, group.attrs)
     for name in group:
@@ -68,7 +63,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
         member = group[name]
         if isinstance(member, Mapping):
             if depth < _DEEPEST:
-                tree[name] = _tree(member, h5py, counted, depth + 1, unit)
+                tree[name] = hdf5_tree(member, counted, depth + 1, unit)
         # What lies in other files is passed over: a file from elsewhere must not make the program read others.
         elif isinstance(member, h5py.Dataset) and not member.external and not member.is_virtual:
             names = tuple(member.attrs)

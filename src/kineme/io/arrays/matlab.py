@@ -19,7 +19,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import Named, parsed_arrays
 from kineme.io.arrays.tree_movements import tree_movements
-from kineme.io.arrays.trees import has_times
+from kineme.io.arrays.trees import SAY_STEP, has_times
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed
@@ -102,8 +102,7 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     if not tree:
         got = listed(variables)
         raise DataError(
-            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}; say the "
-            "seconds between two samples with units=, in the shell --units"
+            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}{SAY_STEP}"
         )
     return tree_movements(tree, layout, "MATLAB")
 

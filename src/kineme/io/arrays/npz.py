@@ -12,7 +12,7 @@ import math
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -39,18 +39,16 @@ class Npz(Mapping[str, NDArray[Any]]):
 
     def __init__(self, data: bytes, path: Path) -> None:
         self._path, self._taken = path, 0
-        try:
+        with self._damaged():
             self._archive = zipfile.ZipFile(io.BytesIO(data))
-        except Exception as error:  # zipfile raises many exceptions on damaged files
-            raise self._damaged(error) from error
-        listed = [member for member in self._archive.infolist() if member.filename.endswith(_ENDING)]
-        self._members = {member.filename.removesuffix(_ENDING): member for member in listed}
-        if len(self._members) < len(listed):
-            raise self._damaged("two entries of one name")
+            listed = [member for member in self._archive.infolist() if member.filename.endswith(_ENDING)]
+            self._members = {member.filename.removesuffix(_ENDING): member for member in listed}
+            if len(self._members) < len(listed):
+                raise ValueError("two entries of one name")
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         member = self._members[name]
-        try:
+        with self._damaged():
             self._take(member.file_size)
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
@@ -59,10 +57,6 @@ class Npz(Mapping[str, NDArray[Any]]):
             if len(content) != member.file_size:
                 raise ValueError(f"a truncated entry {member.filename!r}")
             return _decoded(content, repr(name), self._path, self._take)
-        except DataError:
-            raise
-        except Exception as error:  # as above; array headers are Python literals, which can raise more
-            raise self._damaged(error) from error
 
     def __contains__(self, name: object) -> bool:
         return name in self._members
@@ -77,11 +71,10 @@ class Npz(Mapping[str, NDArray[Any]]):
         self._taken += n_bytes
         check_expanded(self._taken)
 
-    def _damaged(self, error: object) -> DataError:
-        return DataError(
-            f"expected {self._path} to be an archive of arrays, got something foreign, truncated or damaged ({error}); "
-            "save it again, or take it from a backup"
-        )
+    def _damaged(self) -> AbstractContextManager[None]:
+        # zipfile raises many exceptions on damaged files; array headers are Python literals, which can raise more.
+        said = f"expected {self._path} to be an archive of arrays, got something foreign, truncated or damaged"
+        return damaged_as(said, Exception, remedy="; save it again, or take it from a backup")
 
 
 def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:

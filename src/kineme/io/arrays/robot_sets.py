@@ -11,7 +11,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -93,17 +93,14 @@ class _Part(NamedTuple):
 
 
 def robot_layout(path: Path) -> RobotLayout | None:
-    """Tell the layout of a file, or of the first file in a folder; None of any other, and of what is damaged.
-
-    A `DataError` says which package is missing to tell.
-    """
+    """Tell the layout of a file, or of the first in a folder; None of others, a `DataError` if a package is missing."""
     try:
         for source in _sources(path)[:1]:
             if source.suffix.lower() in HDF5:
                 with hdf5_file(source) as file:
                     return _of_hdf5(file)
             with zarr_arrays(source) as arrays:
-                return _of_zarr(arrays)
+                return _marked(arrays, LAYOUTS["Zarr"])
     except (OSError, ValueError) as error:  # a `DataError` is an OSError
         if isinstance(error.__cause__, ImportError):
             raise
@@ -397,18 +394,14 @@ def _of_hdf5(file: Any) -> RobotLayout | None:
     return _marked(names, LAYOUTS["HDF5"])
 
 
-def _of_zarr(arrays: Mapping[str, Any]) -> RobotLayout | None:
-    return _marked([*arrays], LAYOUTS["Zarr"])
-
-
 def _buffer_in(arrays: Mapping[str, Any], path: Path) -> RobotLayout:
     """Tell the layout of a replay buffer in Zarr; a `DataError` if it is none."""
-    if (row := _of_zarr(arrays)) is None:
+    if (row := _marked(arrays, LAYOUTS["Zarr"])) is None:
         raise DataError(f"expected a replay buffer in {path.name}, with data/ and {ENDS}, got {listed(arrays)}")
     return row
 
 
-def _marked(names: Sequence[str], rows: Sequence[RobotLayout]) -> RobotLayout | None:
+def _marked(names: Iterable[str], rows: Sequence[RobotLayout]) -> RobotLayout | None:
     return next(
         (row for row in rows if all(any(re.fullmatch(mark, name) for name in names) for mark in row.marks)), None
     )

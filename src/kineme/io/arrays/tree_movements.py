@@ -22,7 +22,7 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, STAMP, Style, TreeMovement, movements_in
+from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, TreeMovement, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -33,7 +33,7 @@ from kineme.movements.trajectories.movements import axis_names
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
-def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
+def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, many: str = "refuse") -> Parsed:
     """Return the movements of a tree, see `kineme.io.arrays.trees`.
 
     Several arrays of more than one column, of which `layout` chooses none, are refused unless `many` is "take": they
@@ -51,7 +51,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
-    heads, owners = _heads(first, names)
+    of_arrays = {name: heads_of_array(name, first.entries[name].shape) for name in names}
+    heads = tuple(chain.from_iterable(of_arrays.values()))
+    owners = tuple(name for name, several in of_arrays.items() for _ in several)
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
@@ -104,10 +106,7 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
     if len(movements) == 1 and not isinstance(layout.units, float | int):
-        raise DataError(
-            "expected times beside the positions, got one array alone; say the seconds between two samples with "
-            "units=, in the shell --units"
-        )
+        raise DataError(f"expected times beside the positions, got one array alone{SAY_STEP}")
     check_expanded(
         8 * sum(int(np.prod(movement.entries[""].shape)) for movement in movements if "" in movement.entries)
     )
@@ -138,16 +137,6 @@ def _plainly_named(movement: TreeMovement) -> TreeMovement:
             entries={"" if name == wide[0] else name: entry for name, entry in movement.entries.items()}
         )
     return movement
-
-
-def _heads(movement: TreeMovement, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return a head for each column, and the array that it is of."""
-    heads, owners = [], []
-    for name in names:
-        of_array = heads_of_array(name, movement.entries[name].shape)
-        heads += of_array
-        owners += [name] * len(of_array)
-    return tuple(heads), tuple(owners)
 
 
 def heads_of_array(name: str, shape: Sequence[int]) -> list[str]:

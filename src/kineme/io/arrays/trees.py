@@ -30,6 +30,8 @@ _BESIDE_RATE = frozenset(
 )
 #: Head of the times that follow from a rate.
 STAMP = "time [s]"
+#: What to do where nothing says when samples were taken.
+SAY_STEP = "; say the seconds between two samples with units=, in the shell --units"
 _TIMES_OF = re.compile(r"(.+)[_./-](?:t|times?|time_?stamps?)|(?:t|times?|time_?stamps?)[_./-](.+)", re.IGNORECASE)
 #: Words of names that say how a file is built, not which movement it holds.
 _STRUCTURAL = frozenset(
@@ -45,14 +47,9 @@ _WIDEST = 1000  # numbers in a sample; images have more
 _DEEPEST = 12  # groups within groups
 
 
-class Style(NamedTuple):
-    """The meaning of arrays side by side, and the separator of names of groups and arrays within a movement."""
-
-    separator: str
-    alike_are_columns: bool  # arrays of one length and one width: columns of one movement, or movements each
-
-
-NAMES, GROUPS = Style(".", False), Style("/", True)
+#: What separates names of groups and arrays within a movement. Arrays of one length and one width, side by side, are
+#: columns of one movement in groups, else movements each.
+NAMES, GROUPS = ".", "/"
 
 
 class Rate(NamedTuple):
@@ -64,10 +61,7 @@ class Rate(NamedTuple):
     def stamps(self, n: int) -> Any:
         """Return the times [s] of n samples."""
         if math.isnan(self.hertz):
-            raise DataError(
-                f"expected one rate, got {self.name}; say the seconds between two samples with units=, in the shell "
-                "--units"
-            )
+            raise DataError(f"expected one rate, got {self.name}{SAY_STEP}")
         return np.arange(n) / self.hertz
 
 
@@ -100,7 +94,7 @@ class TreeMovement(NamedTuple):
 
 
 def movements_in(
-    tree: Any, style: Style = NAMES, place: str = "", label: str | None = None, rate: Rate | None = None
+    tree: Any, style: str = NAMES, place: str = "", label: str | None = None, rate: Rate | None = None
 ) -> Iterator[TreeMovement]:
     """Yield the movements in a tree, at the rate of the group around them where they say none."""
     if place.count("/") > _DEEPEST:
@@ -129,7 +123,7 @@ def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] =
 
 
 def _of_group(
-    tree: Mapping[str, Any], style: Style, place: str, label: str | None, rate: Rate | None
+    tree: Mapping[str, Any], style: str, place: str, label: str | None, rate: Rate | None
 ) -> Iterator[TreeMovement]:
     label = _own_label(tree) or label
     labels = _labels_of_sets(tree)
@@ -149,7 +143,7 @@ def _of_group(
     stamps = {name for name, owner in owners.items() if owner in arrays}
     own_times = all(name in times or name in stamps for name in arrays)
     if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
-        entries = {inner: entry for inner, entry in flat(tree, style.separator) if _fits(entry)}
+        entries = {inner: entry for inner, entry in flat(tree, style) if _fits(entry)}
         yield TreeMovement(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
     for name, array in arrays.items():
@@ -194,7 +188,7 @@ def as_label(value: Any) -> str | None:
     return None if value is None else str(value) or None
 
 
-def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> bool:
+def _are_columns(arrays: Mapping[str, Any], style: str, rate: Rate | None) -> bool:
     """Tell whether arrays, or most of them beside a rate, are columns of one movement."""
     if any(is_time(name) and len(array.shape) == 1 for name, array in arrays.items()):
         return True
@@ -203,7 +197,7 @@ def _are_columns(arrays: Mapping[str, Any], style: Style, rate: Rate | None) -> 
     if len(lengths) > 1:
         length, count = lengths.most_common(1)[0]
         return rate is not None and 2 * count > len(flat) and len({shape for shape in flat if shape[0] == length}) > 1
-    return len(set(flat)) > 1 or all(len(shape) == 1 for shape in flat) or (style.alike_are_columns and len(flat) > 1)
+    return len(set(flat)) > 1 or all(len(shape) == 1 for shape in flat) or (style == GROUPS and len(flat) > 1)
 
 
 def _continues(arrays: Mapping[str, Any], groups: Mapping[str, Any]) -> bool:

@@ -38,7 +38,7 @@ class _Files(NamedTuple):
 
     read: Callable[[str], bytes | None]  # None: it is not there
     has: Callable[[str], bool]
-    arrays: list[str]  # group and name of each array
+    arrays: list[str]  # group and name of each array, as ``data/action``
 
 
 class ZarrArray:
@@ -124,10 +124,7 @@ class ZarrArray:
 
 @contextmanager
 def zarr_arrays(path: Path) -> Iterator[dict[str, ZarrArray | DataError]]:
-    """Context manager: the arrays in the groups of a folder, or of a .zip archive; and why others are not read.
-
-    Names are those of group and array, as ``data/action``.
-    """
+    """Context manager: the arrays in the groups of a folder or a .zip archive by name, or why one is not read."""
     if path.is_dir():
         yield _opened(_of_folder(path))
         return

@@ -74,7 +74,6 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: se
     name = name if len(name) <= _NAME else name[: _NAME - 1] + "…"
     axes.set_title(f"{drawable(name)} ({len(chosen)})", pad=3)
     if paths[0].shape[1] > 2:
-        # Equal scales, no tick labels, and faint background planes.
         axes.set_aspect("equal")
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 reserve space for empty labels

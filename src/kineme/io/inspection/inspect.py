@@ -98,14 +98,8 @@ class Measures(NamedTuple):
 
 def measures_of(recordings: Recordings) -> Measures:
     """Measure each movement."""
-    demos = recordings.demonstrations
-    sampling = sampling_of(demos)
-    extents = extents_of(demos).max(axis=1)
-    labels = np.array([*recordings.labels, None], dtype=object)[:-1]
-    return Measures(
-        labels, demos.lengths, demos.durations, sampling.rates, sampling.jitters, sampling.gaps, sampling.longest,
-        extents,
-    )  # fmt: skip
+    demos, extents = recordings.demonstrations, extents_of(recordings.demonstrations).max(axis=1)
+    return Measures(recordings.labels, demos.lengths, demos.durations, *sampling_of(demos), extents)
 
 
 def summaries(measures: Measures) -> tuple[LabelSummary, ...]:
@@ -143,22 +137,11 @@ def labels_in_order(labels: Iterable[str | None]) -> list[str | None]:
 
 
 def _summary(label: str | None, chosen: NDArray[np.intp], measures: Measures) -> LabelSummary:
-    gaps = measures.gaps[chosen]
-    return LabelSummary(
-        label,
-        len(chosen),
-        _range(measures.samples[chosen].astype(float)),
-        _range(measures.durations[chosen]),
-        _range(measures.rates[chosen]),
-        _range(measures.extents[chosen]),
-        float(np.median(measures.jitters[chosen])),
-        int(gaps.sum()),
-        float(measures.longest[chosen][gaps > 0].max(initial=0.0)),
-    )
-
-
-def _range(values: Array) -> Range:
-    return Range(float(values.min()), float(np.median(values)), float(values.max()))
+    gaps, jitter = measures.gaps[chosen], float(np.median(measures.jitters[chosen]))
+    several = [x[chosen] for x in (measures.samples, measures.durations, measures.rates, measures.extents)]
+    samples, duration, rate, extent = (Range(float(x.min()), float(np.median(x)), float(x.max())) for x in several)
+    longest = float(measures.longest[chosen][gaps > 0].max(initial=0.0))
+    return LabelSummary(label, len(chosen), samples, duration, rate, extent, jitter, int(gaps.sum()), longest)
 
 
 def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str]:
@@ -170,16 +153,27 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
     if any(how.format.startswith("LeRobot") for how, _ in recordings.detected):
         notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
-    notes += notes_on_aside(how for how, _ in recordings.detected)
-    notes += notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
+    notes += notes_on_heads(recordings)
     single = [str(summary.label) for summary in labels if summary.label is not None and summary.movements == 1]
     if single:
         notes.append(f"only one movement labeled {', '.join(single[:5])}{' and others' if len(single) > 5 else ''}")
     unlabeled = sum(summary.movements for summary in labels if summary.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    notes += notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos) + notes_on_points(demos)
-    return notes + notes_on_extents(demos) + _notes_on_channels(demos)
+    return notes + notes_on_samples(recordings) + _notes_on_channels(demos)
+
+
+def notes_on_heads(recordings: Recordings) -> list[str]:
+    """Say which columns are left aside, and which are read in another order or unit than their file has them."""
+    several, ours = dict(recordings.detected), columns_recorded(recordings.demonstrations.channels or ())
+    return notes_on_aside(several) + notes_on_order(several, ours)
+
+
+def notes_on_samples(recordings: Recordings) -> list[str]:
+    """Say what a person should know of the samples before they rely on what is learned of them."""
+    demos = recordings.demonstrations
+    notes = notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos)
+    return notes + _notes_on_points(demos) + _notes_on_extents(demos)
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
@@ -234,13 +228,13 @@ def _sides(x: Array, offsets: NDArray[np.intp]) -> Array:
     return np.asarray(np.maximum.reduceat(x, offsets[:-1], axis=0) - np.minimum.reduceat(x, offsets[:-1], axis=0))
 
 
-def notes_on_points(demos: Demonstrations) -> list[str]:
+def _notes_on_points(demos: Demonstrations) -> list[str]:
     """Say which points the columns are, by their names, and how they are compared."""
     names = point_names(demos.channels)
     return [f"{len(names)} points that turn together: {first_names(names, _CHANNELS)}"] if names else []
 
 
-def notes_on_extents(demos: Demonstrations) -> list[str]:
+def _notes_on_extents(demos: Demonstrations) -> list[str]:
     """Say that a group of columns reaches much further than all others, as a gripper in mm beside joints in radians."""
     greatest = extents_of(demos).max(axis=0, initial=0.0)
     groups: dict[str, dict[str, float]] = {}

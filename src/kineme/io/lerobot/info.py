@@ -163,8 +163,7 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
     places: tuple[NDArray[np.int64], ...]
     if info.version == 2:
         rows = list(_lines(folder / _V2, ("episode_index", "length"), problems))
-        columns = [np.array([row[name] for row in rows], dtype=np.int64) for name in ("episode_index", "length")]
-        numbers, lengths = columns
+        numbers, lengths = (np.array([row[name] for row in rows], np.int64) for name in ("episode_index", "length"))
         names, places = ("episode_chunk", "episode_index"), (numbers // info.chunk, numbers)
     else:
         in_files = _SHARD if info.storage == "parquet" else ()

@@ -53,10 +53,9 @@ def lerobot_parts(
 ) -> Iterator[Callable[[Layout], Parsed]]:
     """Yield parts of a data set, some whole episodes each, as functions from one of `layouts` to its movements.
 
-    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part, unless
-    they are a range. The features are
-    those of the layouts that the data set can fill. A part whose episodes all are damaged says why in
-    `Parsed.left_out`, and has no movements.
+    A batch of frames and one part are in memory at a time; episodes with these `numbers` are one part, unless they are
+    a range. The features are those of the layouts that the data set can fill. A part whose episodes all are damaged
+    says why in `Parsed.left_out`.
     """
     info = read_info(folder)
     features: dict[str, int] = {}
@@ -227,7 +226,6 @@ def whole_episodes(
         f"{f'episode {k}' if k >= 0 else 'frames without an episode_index'}: {reason}"
         for k, reason in sorted(wrong.items())
     ]
-    # Episodes without frames in shards that were read.
     absent = set(np.setdiff1d(declared.numbers, numbers).tolist())
     places = zip(declared.numbers.tolist(), declared.shards, strict=True) if absent else ()
     left_out += [

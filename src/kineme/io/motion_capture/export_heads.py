@@ -156,7 +156,8 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)
     plain = without_common_subject(names[2:])
     quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
-    heads, units = ["frame", "time [s]"], ["", "s"]
+    timed = n > 1 and rows[at][1].lower().startswith("time")
+    heads, units = ["frame", STAMP if timed else ""], ["", "s"]
     axes = [cell.lower() for cell in rows[at][2:]]
     for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], axes, strict=True):
         what = content.lower()
@@ -171,9 +172,6 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
             "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
         )
     rate = positive(said.get("export frame rate") or said.get("capture frame rate") or "")
-    timed = len(rows[at]) > 1 and rows[at][1].lower().startswith("time")
-    if not timed:
-        heads[1] = ""
     return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
 
 

@@ -78,9 +78,7 @@ def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str])
     """Return a block without the movements, or with `skip` the samples alone, that lack values; a problem for each."""
     lacking: Flags = np.asarray(np.isnan(block.positions).any(axis=1))
     counts = np.diff(np.concatenate(([0], np.cumsum(lacking)))[block.offsets])
-    readable: Flags = np.asarray(
-        np.diff(block.offsets) - counts >= MIN_SAMPLES if skip == "sample" else counts == 0, dtype=np.bool_
-    )
+    readable: Flags = np.diff(block.offsets) - counts >= MIN_SAMPLES if skip == "sample" else counts == 0
     problems = []
     for i in np.flatnonzero(counts).tolist():
         first = int(block.offsets[i] + np.argmax(lacking[block.offsets[i] :]))

@@ -33,7 +33,7 @@ def in_one_set(
     files: Sequence[FileRead], by_number: bool = False
 ) -> tuple[list[FileRead], list[FileRead], list[Problem]]:
     """Return files with the columns of most in their order and units, others without names of columns, and problems."""
-    columns = [_columns(file) for file in files]
+    columns = [_columns_of(file.detected) for file in files]
     keys = [(frozenset(own.names), sensors_of(file.path)) for file, own in zip(files, columns, strict=True)]
     named = [key for key, file, own in zip(keys, files, columns, strict=True) if not _is_nameless(file, own)]
     most = Counter(named or keys).most_common(1)[0][0]
@@ -54,10 +54,9 @@ def in_one_set(
                 else f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
             )
             problems.append(Problem(file.path, None, unlike))
+        elif own == ours:
+            same.append(file)
         else:
-            if own == ours:
-                same.append(file)
-                continue
             measured_in = tuple(unit or "" for unit in ours.units)
             detected = file.detected._replace(columns=ours.heads, measured_in=measured_in)
             try:
@@ -70,11 +69,12 @@ def in_one_set(
 
 def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> list[Problem]:
     """Say which columns files lack, or have besides, that have other numbers of columns than most."""
-    named = Counter(own for own in map(_columns, most) if not own.are_nameless)
-    ours, n_dims = (named or Counter(map(_columns, most))).most_common(1)[0][0], most[0].n_dims
+    columns = [_columns_of(file.detected) for file in most]
+    named = Counter(own for own in columns if not own.are_nameless)
+    ours, n_dims = (named or Counter(columns)).most_common(1)[0][0], most[0].n_dims
     problems = []
     for file in files:
-        own = _columns(file)
+        own = _columns_of(file.detected)
         unlike = "" if _is_nameless(file, own) or not named else f": {_differences(own, ours)}"
         problems.append(Problem(file.path, None, f"{file.n_dims} dimensions where most have {n_dims}{unlike}"))
     return problems
@@ -144,10 +144,6 @@ def sensors_of(path: str) -> frozenset[str]:
 
 def _is_nameless(file: FileRead, own: Columns) -> bool:
     return own.are_nameless or not file.detected.named
-
-
-def _columns(file: FileRead) -> Columns:
-    return _columns_of(file.detected)
 
 
 def _columns_of(how: Detected) -> Columns:

@@ -53,4 +53,4 @@ def episode_recordings(episode: Episode, name: str, columns: Sequence[str] = ())
         return table_movements(table, choose_roles(names, ("number",) * len(names), layout), layout, "episode")
 
     layout = Layout(time=0, columns=tuple(columns) or tuple(range(1, len(names))))
-    return merge_files([parsed_file(parse, Format(), Path(name), layout)], name)
+    return merge_files([parsed_file(parse, Format(), Path(name), layout)], name, layout)

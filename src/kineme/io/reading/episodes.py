@@ -1,10 +1,9 @@
-"""Episodes of robot data of any layout, one after the other: the table of layouts, and which of them a path holds."""
+"""Episodes of robot data of any layout, one after the other, and which layout a path has."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.arrays.robot_sets import LAYOUTS, robot_episodes, robot_layout
@@ -16,36 +15,9 @@ from kineme.reporting.text import first_names
 _NEAR = 3  # data sets in a folder, or around it, that a message names
 
 
-class EpisodeLayout(NamedTuple):
-    """A layout of files that holds episodes of robot data."""
-
-    name: str
-    # Whether a file or folder has it; reads little, and raises a `DataError` only if a package is missing.
-    fits: Callable[[Path], bool]
-    # The path, the names of the features to read, None for all of numbers, and a rate [1/s], None for that of the set
-    # or of the custom, -> episodes as they are stored.
-    read: Callable[[Path, Sequence[str] | None, float | None], Iterator[Episode]]
-
-
-def _lerobot(
-    path: Path, features: Sequence[str] | None, rate: float | None, numbers: Collection[int] | None = None
-) -> Iterator[Episode]:
-    if rate is not None:
-        raise SpecificationError(f"expected no rate for a data set of LeRobot, which has stamps, got {rate:g}")
-    with needs("pyarrow", "read LeRobot", "parquet"):
-        from kineme.io.lerobot.episodes import episodes
-    return episodes(path, features, numbers)
-
-
-#: Layouts in the order in which they are tried.
-EPISODE_LAYOUTS: tuple[EpisodeLayout, ...] = (
-    EpisodeLayout("LeRobot", lambda path: (path / MARKER).is_file(), _lerobot),
-    EpisodeLayout(
-        ", ".join(row.name for rows in LAYOUTS.values() for row in rows),
-        lambda path: robot_layout(path) is not None,
-        robot_episodes,
-    ),
-)
+def holds_episodes(path: Path) -> bool:
+    """Tell whether a file or folder is a data set of episodes; a `DataError` only if a package is missing to tell."""
+    return (path / MARKER).is_file() or robot_layout(path) is not None
 
 
 def read_episodes(
@@ -62,14 +34,18 @@ def read_episodes(
     single episode stands in its `problems`.
     """
     path = Path(path)
-    layout = next((layout for layout in EPISODE_LAYOUTS if layout.fits(path)), None)
+    if (path / MARKER).is_file():
+        if rate is not None:
+            raise SpecificationError(f"expected no rate for a data set of LeRobot, which has stamps, got {rate:g}")
+        with needs("pyarrow", "read LeRobot", "parquet"):
+            from kineme.io.lerobot.episodes import episodes
+        return episodes(path, features, numbers)
+    is_robot = robot_layout(path) is not None
     within = sorted(marker.parents[1] for marker in path.glob(f"*/{MARKER}"))
-    if layout is not None and (layout is EPISODE_LAYOUTS[0] or not within):
-        if layout is EPISODE_LAYOUTS[0]:
-            return _lerobot(path, features, rate, numbers)
-        return layout.read(path, features, rate)
-    there = "nothing there" if not path.exists() else "another" if layout is None else "several"
-    layouts = ", ".join(layout.name for layout in EPISODE_LAYOUTS)
+    if is_robot and not within:
+        return robot_episodes(path, features, rate)
+    there = "nothing there" if not path.exists() else "several" if is_robot else "another"
+    layouts = ", ".join(["LeRobot", *(row.name for rows in LAYOUTS.values() for row in rows)])
     around = [folder for folder in path.absolute().parents[:3] if (folder / MARKER).is_file()]
     near = around or within
     remedy = f"; say the folder of one: {first_names(near, _NEAR)}" if near and path.exists() else ""

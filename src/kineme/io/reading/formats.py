@@ -288,10 +288,9 @@ def leads_out(link: Path, folder: Path) -> bool:
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:
     """Tell whether a path is a folder; False if unknown, as for a link to itself: reading it as a file reports why."""
-    try:
+    with suppress(OSError):
         return entry.is_dir()
-    except OSError:
-        return False
+    return False
 
 
 def as_text(path: Path | str) -> str:

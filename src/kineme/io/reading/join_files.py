@@ -222,7 +222,6 @@ def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str]
         columns = canonical(columns, block.offsets, channels)
     units = dict(zip(detected.columns, detected.measured_in or [""] * len(detected.columns), strict=True))
     names = recorded_names(channels)
-    # Columns (T, m) of channels at times `at` within their own `times`.
     times = _times(read)
     values = np.empty((len(at), columns.shape[1]))
     before = np.searchsorted(times, at, side="right") - 1

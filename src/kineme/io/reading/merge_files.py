@@ -109,14 +109,7 @@ class Recordings(MovementSequence):
         return f"Recordings({self.demonstrations!r}, {files}, {problems})"
 
 
-def merge_files(
-    files: Sequence[FileRead],
-    where: str,
-    problems: Sequence[Problem] = (),
-    kinds: Given | None = None,
-    skip: str = "movement",
-    by_number: bool = False,
-) -> Recordings:
+def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems: Sequence[Problem] = ()) -> Recordings:
     """Return one `Recordings` of all files read at `where` that hold movements, and of problems that came before."""
     reported = [*problems, *(problem for file in files for problem in file.problems)]
     full = [file for file in files if file.block.labels]
@@ -130,7 +123,7 @@ def merge_files(
     full = [file for file in full if file.n_dims == n_dims]
     reported += dimensions_unlike(odd, full)
     understood = {file.path: file.detected for file in full}
-    full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
+    full, channels, odd_channels = with_channels(full, layout)
     reported += odd_channels
     if not any(file.block.labels for file in full):
         none = next((problem for problem in reported if not problem.samples), reported[0])
@@ -146,17 +139,16 @@ def merge_files(
             strict=True,
         )
     )
-    detected = Counter(understood[file.path] for file in full)
+    detected = Counter(understood[file.path] for file in full).most_common()
     blocks = [file.block for file in full]
     positions = _concatenated([block.positions for block in blocks])
     times = _concatenated([_stamps(block) for block in blocks])
     demonstrations = demonstrations_of(positions, times, _offsets_of(blocks), sources, channels)
-    understood_as = detected.most_common()
-    taken = [how.columns for how, _ in understood_as if by_number and how.named]
+    taken = [how.columns for how, _ in detected if layout.by_number and how.named]
     notes = (
         [f"read the columns of these numbers, {listed(taken[0])}: counted from 0, over all of a file"] if taken else []
     )
-    return Recordings(demonstrations, sources, tuple(reported), tuple(understood_as), tuple(notes))
+    return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
 
 
 def demonstrations_of(
@@ -192,15 +184,14 @@ def _stamps(block: Block) -> Any:
     return within / np.repeat(lengths - 1, lengths)
 
 
-def with_channels(
-    files: Sequence[FileRead], given: Given, skip: str = "movement", by_number: bool = False
-) -> tuple[list[FileRead], Channels | None, list[Problem]]:
+def with_channels(files: Sequence[FileRead], layout: Layout) -> tuple[list[FileRead], Channels | None, list[Problem]]:
     """Return files with equally many columns that have the same channels, these channels, and problems.
 
-    Kinds are found for all files together. Files whose columns have no names, or are chosen `by_number`, are merged by
+    Kinds are found for all files together. Files whose columns have no names, or are chosen by numbers, are merged by
     the order of their columns while all are positions or angles, and then nothing is known of the channels.
     """
-    same, nameless, problems = in_one_set(files, by_number)
+    given = layout.kinds or {}
+    same, nameless, problems = in_one_set(files, layout.by_number)
     channels = _channels_of(same, given)
     if nameless and is_plain(channels):
         place = {file.path: k for k, file in enumerate(files)}
@@ -210,20 +201,15 @@ def with_channels(
         Problem(file.path, None, f"no names of columns where most files have {heads}; name them as these are")
         for file in nameless
     ]
-    checked = [_check_orientations(file, channels, skip) for file in same]
+    checked = [_check_orientations(file, channels, layout.skip) for file in same]
     problems += [problem for _, several in checked for problem in several]
     return [file for file, _ in checked], channels, problems
 
 
 def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
     blocks, detected = [file.block for file in files], files[0].detected
-    return find_channels(
-        detected.columns,
-        np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
-        _offsets_of(blocks),
-        given,
-        detected.measured_in,
-    )
+    positions = np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions
+    return find_channels(detected.columns, positions, _offsets_of(blocks), given, detected.measured_in)
 
 
 def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
@@ -231,9 +217,7 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
     groups: dict[tuple[str, ...], list[FileRead]] = {}
     for file in files:
         groups.setdefault(file.detected.columns, []).append(file)
-    channels_of_heads = {}
-    for heads, group in groups.items():
-        channels_of_heads[heads] = _channels_of(group, kinds_of(given, heads))
+    channels_of_heads = {heads: _channels_of(group, kinds_of(given, heads)) for heads, group in groups.items()}
     result = []
     for file in files:
         block, channels = file.block, channels_of_heads[file.detected.columns]

@@ -13,10 +13,9 @@ from kineme.io.lerobot.info import MARKER
 from kineme.io.reading.formats import Entry, Format, data_set_of, entries_of, read_parquet
 from kineme.io.reading.merge_files import Recordings, merge_files
 from kineme.io.reading.read_file import parsed_file
-from kineme.io.reading.recordings import TASK, NameRule, check_asked, heads_of, read_entries, trimmed
+from kineme.io.reading.recordings import TASK, HowToRead, check_asked, heads_of, read_entries, trimmed
 from kineme.io.records import Problem, needs
 from kineme.movements.episodes import number_at
-from kineme.movements.tables.layout import Layout
 
 
 def is_episodic(path: Path) -> bool:
@@ -26,35 +25,21 @@ def is_episodic(path: Path) -> bool:
 
 
 def read_pieces(
-    paths: Sequence[Path],
-    layout: Layout,
-    rule: NameRule,
-    *,
-    follow_links: bool = False,
-    trim: bool = False,
-    places: Collection[str] | None = None,
+    paths: Sequence[Path], how: HowToRead, places: Collection[str] | None = None
 ) -> Iterator[Recordings | Problem]:
     """Yield recordings of files, folders and patterns, as `read_paths` reads them, or the problem with a file.
 
     Each piece has the channels of its own samples. A data set that is read some episodes at a time has no checksum; of
     it only the episodes at these `places` are read, all at once, if there are any.
     """
-    entries, problems = entries_of(paths, follow_links)
+    entries, problems = entries_of(paths, how.follow_links)
     yield from problems
     numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
     for entry in entries:
-        yield from read_entry(entry, layout, rule, follow_links=follow_links, trim=trim, numbers=numbers)
+        yield from read_entry(entry, how, numbers)
 
 
-def read_entry(
-    entry: Entry,
-    layout: Layout,
-    rule: NameRule,
-    *,
-    follow_links: bool = False,
-    trim: bool = False,
-    numbers: Collection[int] | None = None,
-) -> Iterator[Recordings | Problem]:
+def read_entry(entry: Entry, how: HowToRead, numbers: Collection[int] | None = None) -> Iterator[Recordings | Problem]:
     """Yield the recordings of a file or data set, of the latter some episodes at a time, or the problem with it.
 
     Of a data set, the episodes with these `numbers` are read, all at once unless they are a range. Of a file of
@@ -62,22 +47,21 @@ def read_entry(
     """
     try:
         if isinstance(numbers, range) or is_episodic(entry.path):
-            yield from _in_parts(entry, layout, rule, trim, numbers)
+            yield from _in_parts(entry, how, numbers)
         else:
-            recordings = read_entries([entry], layout, rule, follow_links=follow_links, trim=trim)
-            check_asked(layout, heads_of(recordings), recordings.people is not None, entry.name)
+            recordings = read_entries([entry], how._replace(join=False))
+            check_asked(how.layout, heads_of(recordings), recordings.people is not None, entry.name)
             yield recordings
     except (KinemeError, OSError) as error:
         reason = str(error).removeprefix(f"{entry.path}: ").removeprefix(f"{entry.name}: ")
         yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
-def _in_parts(
-    entry: Entry, layout: Layout, rule: NameRule, trim: bool, numbers: Collection[int] | None
-) -> Iterator[Recordings | Problem]:
+def _in_parts(entry: Entry, how: HowToRead, numbers: Collection[int] | None) -> Iterator[Recordings | Problem]:
     """Yield the whole episodes of a data set, and why others are not; or the movements of some groups of rows."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
+    layout, rule = how.layout, how.rule
     learned = layout.reference.columns if layout.reference is not None and layout.coordinates is None else ()
     layouts = [replace(layout, columns=learned), layout] if learned else [layout]
     parts: Iterable[Any] = ()
@@ -91,5 +75,5 @@ def _in_parts(
         if not file.block.labels:
             yield from file.problems
             continue
-        recordings = merge_files([file], entry.name, (), layout.kinds, layout.skip, layout.by_number)
-        yield trimmed(recordings) if trim else recordings
+        recordings = merge_files([file], entry.name, layout)
+        yield trimmed(recordings) if how.trim else recordings

@@ -87,17 +87,9 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
 def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
     """Read the content of a file of that name."""
     form = format_of(relative)
-    if form.read_bytes is None:
-        reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
-        read = FileRead(as_text(relative), []).without_movements(reason)
-    else:
-        read = parsed_file(partial(_expanded, form.read_bytes, data), form, relative, layout)
+    assert form.read_bytes is not None  # else its path is read; the standard input is CSV
+    read = parsed_file(partial(form.read_bytes, data), form, relative, layout)
     return read._replace(sha256=hashlib.sha256(data).hexdigest(), size=len(data), mtime=mtime)
-
-
-def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layout) -> Parsed:
-    check_expanded(len(data))
-    return read(data, layout)
 
 
 def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:

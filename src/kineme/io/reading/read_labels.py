@@ -20,7 +20,6 @@ from kineme.io.limits import check_expanded, read_limited
 from kineme.io.reading.merge_files import Recordings, Source, demonstrations_of
 from kineme.io.records import UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.text import counted, text_in
 from kineme.units import UNITS, converted, split_head, unit_named
 from kineme.validation import MIN_SAMPLES, Array
@@ -48,8 +47,7 @@ _NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels t
 class LabelRow(NamedTuple):
     """A row of a table of labels."""
 
-    # start and end: in seconds
-    start: float
+    start: float  # [s], and so is the end
     end: float
     label: str | None
     # recording and place: which recording, and which movement of it; empty where the table does not say
@@ -90,15 +88,11 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     labels = labeled or [k for k in others if names[k] and names[k] not in aside]
     if len(labels) != 1 and not labeled:
         raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
-    return Heads(
-        start,
-        end,
-        labels[0],
-        next((k for k, name in enumerate(names) if name in _RECORDINGS), None),
-        next((k for k, name in enumerate(names) if name in _PLACES), None),
-        (_unit_of(names[start]), _unit_of(names[end])),
-        "time - " in names[start],
+    recording, place = (
+        next((k for k, name in enumerate(names) if name in wanted), None) for wanted in (_RECORDINGS, _PLACES)
     )
+    units = _unit_of(names[start]), _unit_of(names[end])
+    return Heads(start, end, labels[0], recording, place, units, "time - " in names[start])
 
 
 def _is_time(name: str) -> bool:
@@ -302,10 +296,7 @@ def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretc
 
 
 def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
-    """Return the stretches of recordings that a table labels, as movements of their own; see `stretches_of`.
-
-    Rows of none are problems; a `DataError` says that all are.
-    """
+    """Return the stretches of recordings that a table labels, see `stretches_of`, as movements of their own."""
     stretches, problems = stretches_of(recordings, table)
     if not stretches:
         raise DataError(
@@ -318,14 +309,21 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
 
 def cut_stretches(recordings: Recordings, stretches: Sequence[Stretch]) -> Recordings:
     """Return stretches of recordings as movements with the labels of their rows."""
-    demos, sources, rows = recordings.demonstrations, [], []
+    demos, sources, samples = recordings.demonstrations, [], []
+    movements = demos.movements
     for stretch in stretches:
         source, first = recordings.sources[stretch.recording], int(demos.offsets[stretch.recording])
-        times = demos.movements.stamps[first : int(demos.offsets[stretch.recording + 1])]
+        times = movements.stamps[first : int(demos.offsets[stretch.recording + 1])]
         place = _place(source, times, stretch.start, stretch.stop)
         sources.append(source._replace(place=place, label=stretch.row.label))
-        rows.append((first + stretch.start, first + stretch.stop))
-    return replace(recordings, demonstrations=_cut(demos, rows, sources), sources=tuple(sources))
+        samples.append(np.arange(first + stretch.start, first + stretch.stop))
+    # What is learned of orientations and angles begins anew in each.
+    offsets, rows = np.concatenate(([0], np.cumsum([*map(len, samples)]))), np.concatenate(samples)
+    positions = np.ascontiguousarray((demos.positions if movements.channels is None else demos.recorded)[rows])
+    cut = demonstrations_of(
+        positions, movements.stamps[rows], offsets, sources, movements.channels, movements.dimensions
+    )
+    return replace(recordings, demonstrations=cut, sources=tuple(sources))
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
@@ -369,13 +367,3 @@ def _samples(row: LabelRow, times: Array, origin: float) -> tuple[int, int]:
 def _place(source: Source, times: Array, start: int, stop: int) -> str:
     ends = (np.format_float_positional(times[k], precision=4, trim="-") for k in (start, stop - 1))
     return f"{source.place} {'-'.join(ends)} s".strip()
-
-
-def _cut(demos: Demonstrations, stretches: Sequence[tuple[int, int]], sources: Sequence[Source]) -> Demonstrations:
-    """Return the stretches of samples as movements; what is learned of orientations and angles begins anew in each."""
-    movements, samples = demos.movements, np.concatenate([np.arange(*stretch) for stretch in stretches])
-    offsets = np.concatenate(([0], np.cumsum([stop - start for start, stop in stretches])))
-    positions = np.ascontiguousarray((demos.positions if movements.channels is None else demos.recorded)[samples])
-    return demonstrations_of(
-        positions, movements.stamps[samples], offsets, sources, movements.channels, movements.dimensions
-    )

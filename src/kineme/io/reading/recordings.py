@@ -140,9 +140,9 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         time, columns, movement, label, units, skip, kinds, topic, frame, person,
         exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every, measured_in=measured_in,
     )  # fmt: skip
-    rule = NameRule(label_pattern, label_by)
+    how = HowToRead(layout, NameRule(label_pattern, label_by), follow_links, trim, join_files)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(each) for each in path]
-    return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, join=join_files, progress=progress)
+    return read_paths(paths, how, progress=progress)
 
 
 class HowToRead(NamedTuple):
@@ -150,8 +150,9 @@ class HowToRead(NamedTuple):
 
     layout: Layout
     rule: NameRule
-    switches: dict[str, bool]  # follow_links, trim
-    join: bool  # whether the files of a folder are one recording
+    follow_links: bool = False
+    trim: bool = False
+    join: bool = False  # whether the files of a folder are one recording
 
 
 def how_to_read(options: Mapping[str, Any], reference: Known | None = None) -> HowToRead:
@@ -161,64 +162,44 @@ def how_to_read(options: Mapping[str, Any], reference: Known | None = None) -> H
     """
     chosen = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(chosen.pop("label_pattern", None), chosen.pop("label_by", None))
-    switches = {name: bool(chosen.pop(name, False)) for name in ("follow_links", "trim")}
-    join = bool(chosen.pop("join_files", False))
+    switches = [bool(chosen.pop(name, False)) for name in ("follow_links", "trim", "join_files")]
     for name in ("fill_gaps", "rows"):  # libraries store what was given
         if chosen.get(name) is None:
             chosen.pop(name, None)
     chosen["kinds"] = dict(chosen.get("kinds") or ()) or None
-    return HowToRead(Layout(**chosen, reference=reference), rule, switches, join)
+    return HowToRead(Layout(**chosen, reference=reference), rule, *switches)
 
 
-def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
+def read_paths(
     paths: Sequence[Path],
-    layout: Layout,
-    rule: NameRule,
-    *,
-    follow_links: bool = False,
-    trim: bool = False,
-    join: bool = False,
+    how: HowToRead,
     progress: Progress | None = None,
     standard_input: tuple[str, bytes] | None = None,
 ) -> Recordings:
     """Read recordings as `read_recordings` does, and the standard input as a file of some name."""
     max_file_bytes()
+    layout, rule = how.layout, how.rule
     if rule.label_by is not None and layout.label is not None:
         raise SpecificationError("expected label or label_by, not both")
     if rule.names_person and layout.person is not None:
         raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
-    entries, problems = entries_of(paths, follow_links)
-    recordings = read_entries(
-        entries,
-        layout,
-        rule,
-        follow_links=follow_links,
-        trim=trim,
-        join=join,
-        progress=progress,
-        standard_input=standard_input,
-        where=paths,
-        problems=problems,
-    )
+    entries, problems = entries_of(paths, how.follow_links)
+    recordings = read_entries(entries, how, progress, standard_input, paths, problems)
     given = [] if standard_input is None else [Path(standard_input[0])]
     check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
     return recordings
 
 
-def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has found
+def read_entries(
     entries: Sequence[Entry],
-    layout: Layout,
-    rule: NameRule,
-    *,
-    follow_links: bool = False,
-    trim: bool = False,
-    join: bool = False,
+    how: HowToRead,
     progress: Progress | None = None,
     standard_input: tuple[str, bytes] | None = None,
     where: Sequence[Path] = (),
     problems: Sequence[Problem] = (),
 ) -> Recordings:
     """Read files and data sets that are listed already; `where` says in messages what was given."""
+    layout, rule, follow_links, trim, join = how
     read: list[FileRead] = []
     places = list(where) or [Path(entry.name) for entry in entries]
     if standard_input is not None:
@@ -248,7 +229,7 @@ def read_entries(  # noqa: PLR0913 - those of `read_paths`, and what it has foun
             for file, entry in joined
         ]
     read += [rule.apply(file, entry.path) for file, entry in files]
-    recordings = merge_files(read, in_words(places), problems, layout.kinds, layout.skip, layout.by_number)
+    recordings = merge_files(read, in_words(places), layout, problems)
     recordings = replace(recordings, notes=(*recordings.notes, *notes))
     return trimmed(recordings) if trim else recordings
 
@@ -291,10 +272,11 @@ def read_recording(path: str | Path) -> Trajectory:
     if data_set_of(path) is None:
         format_of(path)
     path.stat()
-    read = read_file(path, name_of(path), Layout())
+    layout = Layout()
+    read = read_file(path, name_of(path), layout)
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    recordings = merge_files([read], str(path))
+    recordings = merge_files([read], str(path), layout)
     for problem in recordings.problems:
         raise problem.error(str(problem._replace(file=str(path))))
     if len(recordings) > 1:
@@ -365,7 +347,7 @@ class NameRule:
         if not read.block.labels:
             return read
         by_folder, person = self.label_by not in {None, TASK}, None
-        label = _folder(path, 1 if self.label_by == FOLDER else self.label_by) if by_folder else None
+        label = _folder(path, 1 if self.label_by == FOLDER else int(self.label_by or 1)) if by_folder else None
         if self.label_pattern is not None:
             depth = self.label_pattern.count("/") + 1
             name = "/".join(_parts(path, depth)[-depth:])
@@ -411,9 +393,8 @@ def match(parts: tuple[Part, ...], name: str) -> dict[str, str] | None:
     return None if values is None else dict(zip([part.field for part in parts if part.field], values, strict=True))
 
 
-def _folder(path: Path, level: str | int | None) -> str | None:
+def _folder(path: Path, up: int) -> str | None:
     """Return the name of the folder so many levels up, or None above the topmost."""
-    up = int(level or 1)
     names = _parts(path, up + 1)
     return names[-1 - up] if len(names) > up else None
 

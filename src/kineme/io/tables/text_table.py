@@ -379,7 +379,6 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
             return read, {}
         if not quoted and not any(texts) and dialect.separator:  # an empty cell is usual
             text = "\n".join(line.rstrip("\r\n") for line in plain)
-            # Lines with nan in their empty cells.
             mark = dialect.separator
             for _ in range(2):  # of three separators in a row, the first replacement finds one empty cell
                 text = text.replace(mark + mark, f"{mark}nan{mark}")

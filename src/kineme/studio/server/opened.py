@@ -13,7 +13,7 @@ import numpy as np
 from kineme.errors import DataError, KinemeError
 from kineme.io.lerobot import info
 from kineme.io.reading.episode_recordings import episode_recordings, heads_of
-from kineme.io.reading.episodes import EPISODE_LAYOUTS, read_episodes
+from kineme.io.reading.episodes import holds_episodes, read_episodes
 from kineme.io.reading.formats import entries_of, name_of
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.read_labels import read_labels
@@ -313,7 +313,7 @@ def movement_of(read: Recordings, k: int) -> Recordings:
 
 def opened_at(path: Path) -> Iterator[Opened]:
     """Yield the movements of a data set of episodes, or of files; a file that cannot be read is one with a problem."""
-    if any(layout.fits(path) for layout in EPISODE_LAYOUTS):
+    if holds_episodes(path):
         for episode in read_episodes(path):
             is_file = bool(episode.place) and path.is_dir() and (path / episode.place).is_file()
             yield Opened(episode, *((episode.place, "") if is_file else (str(name_of(path)), episode.place)))
