@@ -74,10 +74,11 @@ class Answer:
         random convolutions rank; None, unknown, if `p_known` is not above the error rate.
     confidence : float
         Probability that the label is right if the movement is of a known class, see `class_probabilities`: of
-        answers with 0.9 about nine in ten are right. On average it differs from that share by 0.14 and 0.29 for
-        exercises at a wrist, 0.11 for long words, 0.07 for signs, 0.04 for LASA severely perturbed, and some 0.02 or
-        less for others (``python -m bench --only open_set``). If unknown, 1 minus `p_known`: the share of known
-        movements that are less novel, and no probability, since it is not known how many movements are of no class.
+        answers with 0.9 about nine in ten are right. From three demonstrations of each class on, it differs from that
+        share on average by 0.08 for exercises at a wrist, and by 0.02 or less for others; with one of each by 0.30 for
+        long words, 0.12 for signs and up to 0.10 for exercises (``python -m bench --only open_set``). If unknown, 1
+        minus `p_known`: the share of known movements that are less novel, and no probability, since it is not known how
+        many movements are of no class.
     probabilities : mapping from label to float
         Probability of each class if the movement is of a known one, see `class_probabilities`; they sum to 1.
     p_known : float

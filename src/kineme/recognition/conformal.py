@@ -42,8 +42,8 @@ REACH_OF_STRANGERS, REACH_TO_NEXT = 0.9, 2 / 3
 FOREIGN = 3.5
 
 #: Power of the ratio of distances before anything is known of it. The right classes of 20 gestures in space by five
-#: people, one to four demonstrations of each, are most likely at 14.3 with demonstrations by the same person and at
-#: 15.7 with those by others (``python -m bench --only open_set``).
+#: people, one demonstration of each, are most likely at 14.4 with demonstrations by the same person and at 15.4 with
+#: those by others (``python -m bench --only open_set``).
 EXPONENT = 15.0
 #: By how much the logarithms of the power differ between sets of movements, about: 5 to 36 were most likely on seven.
 _SPREAD = 0.35
