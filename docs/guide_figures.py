@@ -168,7 +168,7 @@ def reliability() -> Figure:
             error = f"{title} ({row['ours']:.3f})"
             axes.plot(said, right, line, color=color, marker="o", markersize=4, label=error)
     axes.set(xlabel="confidence", ylabel="share of right answers", xlim=(0, 1), ylim=(0, 1), aspect="equal")
-    axes.legend(title="expected calibration error", fontsize="small", loc="upper left")
+    axes.legend(title="expected calibration error", fontsize="small", loc="lower right")
     return figure
 
 
