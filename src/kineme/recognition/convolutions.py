@@ -73,7 +73,10 @@ def fit_kernels(series: Single) -> Kernels:
         one_each = series[rng.integers(n, size=84)]
         own = _convolved(np.einsum("kct,kc->kt", one_each, chosen)[None], dilation)[0]
         shares = ((at * n_thresholds * 84 + np.arange(84 * n_thresholds) + 1) * _GOLDEN % 1.0).reshape(84, -1)
-        thresholds.append(np.stack([np.quantile(row, share) for row, share in zip(own, shares, strict=True)]))
+        # `numpy.quantile` takes the same shares of every row; of each its own they are interpolated here as there.
+        ordered, place = np.sort(own, axis=1).astype(np.float64), shares * (T - 1)
+        low, high = (np.take_along_axis(ordered, each(place).astype(np.intp), axis=1) for each in (np.floor, np.ceil))
+        thresholds.append(low + (place % 1.0) * (high - low))
         channels.append(chosen)
     return Kernels(dilations, tuple(channels), tuple((each + _TIE).astype(np.float32) for each in thresholds))
 
