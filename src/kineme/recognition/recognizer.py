@@ -346,8 +346,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         comparison, references = self._fitted
         calibration = self._calibration
         if calibration is None:
-            calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
-            self._calibration = calibration
+            self._calibration = calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
         return calibration
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
