@@ -28,7 +28,7 @@ from kineme.recognition.answer import fit_known_classes
 from kineme.recognition.classifiers import BY_CONVOLUTIONS, fit_best
 from kineme.recognition.conformal import EXPONENT, LEAST, class_probabilities, distances
 from kineme.similarity.comparison import References
-from kineme.similarity.describe import Described, feature_rows, prepare
+from kineme.similarity.describe import Described, describe
 from kineme.similarity.scores import nearest, score
 from kineme.similarity.specification import ComparisonSpecification
 from kineme_experiments.evaluation.conditions import TOGETHER
@@ -56,9 +56,9 @@ class Recordings:
     @classmethod
     def of(cls, name: str, demos: kineme.Demonstrations, people: NDArray[np.str_]) -> Recordings:
         """Described once, whichever are shown."""
-        rows = feature_rows(demos, _SPECIFICATION)
-        described = prepare(rows, _SPECIFICATION, _SPECIFICATION.procrustes(demos.n_dims))
-        return cls(name, described, demos, np.array([str(label) for label in demos.labels]), people)
+        return cls(
+            name, describe(demos, _SPECIFICATION), demos, np.array([str(label) for label in demos.labels]), people
+        )
 
 
 class Split(NamedTuple):

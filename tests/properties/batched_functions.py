@@ -55,7 +55,7 @@ from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.evidence import cut
 from kineme.similarity.bounds import fit_bases, reduce_features
-from kineme.similarity.describe import describe_rows, feature_rows, maps_onto, paths_of
+from kineme.similarity.describe import describe_rows, feature_rows, maps_onto, paths_of, recorded_values
 from kineme.similarity.describe import moved as laid_onto
 from kineme.similarity.similarity import compare
 from kineme.similarity.specification import ROW_REPRESENTATIONS, SCALES, ComparisonSpecification, Normalization
@@ -643,6 +643,7 @@ TABLE = [
         for translation, cutoff in ((True, 10.0), (False, None))
     ),
     Batched("describe and compare", compared, 2e-5),
+    Batched("recorded_values", lambda demos: each(len(demos), values=recorded_values(demos, 0, len(demos))), 1e-9),
     Batched("maps_onto", aligned, 1e-7),
     Batched("Recognizer", recognized, 2e-5),
     Batched("Recognizer.recognize", answers, 2e-5),

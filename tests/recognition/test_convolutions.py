@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from sklearn.linear_model import Ridge, RidgeCV
 
 import kineme
 from kineme.errors import SpecificationError
-from kineme.recognition.classifiers import LogarithmicPool, NearestEach, NearestProfiled, _profiles
+from kineme.recognition.classifiers import VALUED, LogarithmicPool, NearestEach, NearestProfiled, _profiles
 from kineme.recognition.conformal import class_probabilities, distances, fit_exponent
 from kineme.recognition.convolutions import (
     _ALPHAS,
@@ -221,7 +224,12 @@ def test_the_exponent_of_profiles_is_fitted_to_scores_with_profiles(groups):
         cosines = classifier.profiles @ classifier.profiles[i]
         cosines[hidden] = -np.inf
         by_profiles = (cosines.reshape(3, 4).max(axis=1) - 1) / classifier.width**2
-        away[i] = distances(np.log(0.75 * np.exp(by_kernels) + 0.25 * np.exp(by_profiles)))
+        squares = ((classifier.values.rows - classifier.values.rows[i]) ** 2).sum(axis=1)
+        squares[hidden] = np.inf
+        by_values = -squares.reshape(3, 4).min(axis=1) / (2 * classifier.values.width**2)
+        score = 0.75 * np.exp(by_kernels) + 0.25 * np.exp(by_profiles)
+        share = classifier.values.share
+        away[i] = distances(np.log((1 - share) * score + share * np.exp(by_values)))
         away[i, i // 4] *= ((4 - len(hidden)) / 4) ** (1 / 8)
     expected = fit_exponent(away, np.repeat(np.arange(3), 4), 8.0)
     assert classifier.exponent == pytest.approx(expected, rel=1e-4)
@@ -273,8 +281,86 @@ def test_profiles_are_a_quarter_of_the_score():
     np.testing.assert_allclose(np.linalg.norm(profiles, axis=1), 1.0)
     squares = ((profiles[:, None] - classifier.profiles) ** 2).sum(axis=2)
     nearest = np.stack([squares[:, labels == label].min(axis=1) for label in recognizer.classes_], axis=1)
-    expected = np.log(0.75 * np.exp(kernels) + 0.25 * np.exp(-nearest / (2 * classifier.width**2)))
+    score = 0.75 * np.exp(kernels) + 0.25 * np.exp(-nearest / (2 * classifier.width**2))
+    rows, learned = rows_of_values(asked, shown), rows_of_values(shown, shown)
+    squares = ((rows[:, None] - learned) ** 2).sum(axis=2)
+    nearest = np.stack([squares[:, labels == label].min(axis=1) for label in recognizer.classes_], axis=1)
+    expected = np.log(0.85 * score + 0.15 * np.exp(-nearest / (2 * classifier.values.width**2)))
     np.testing.assert_allclose(recognizer.decision_function(asked), expected, rtol=1e-9, atol=1e-9)
+
+
+def rows_of_values(demos, shown):
+    """Means of eighths and standard deviation of 64 even samples, in units of the spread of what was shown."""
+
+    def samples(movements):
+        stamps = np.linspace(0, 1, 64)
+        each = [
+            CubicSpline(
+                demo.times / demo.times[-1],
+                demo.positions,
+            )(stamps)
+            for demo in movements
+        ]
+        return np.array(each)
+
+    known = samples(shown)
+    spread = np.sqrt((known.std(axis=1) ** 2).mean(axis=0) + known.mean(axis=1).var(axis=0))
+    values = samples(demos) / spread
+    means = values.reshape(len(values), 8, 8, -1).mean(axis=2) / np.sqrt(8)
+    return np.concatenate((means, values.std(axis=1)[:, None]), axis=1).reshape(len(values), -1)
+
+
+def draw_levels(each, seed, n_dims=5, apart=0.0):
+    """Columns of noise whose classes differ by their level and by nothing else; `apart` by who measured them."""
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(size=(4 * each, 60, n_dims)).cumsum(axis=1) / 8 + apart * rng.normal(size=(4 * each, 1, n_dims))
+    labels = np.repeat(np.arange(4), each)
+    return kineme.Demonstrations.from_arrays(list(steps + 3.0 * labels[:, None, None]), labels)
+
+
+@pytest.mark.parametrize("n_dims", [1, 5])
+@pytest.mark.parametrize("each", [1, 3])
+def test_signals_and_sensors_are_told_apart_by_the_level_at_which_they_are(each, n_dims):
+    shown, asked = draw_levels(each, 1, n_dims), draw_levels(10, 2, n_dims)
+    recognizer = kineme.Recognizer().fit(shown)
+    assert recognizer.score(asked) > 0.85
+    assert kineme.Recognizer(classifier="nearest-each").fit(shown).score(asked) < 0.5
+    chosen = np.random.default_rng(3).permutation(40)
+    np.testing.assert_array_equal(recognizer.predict(asked[chosen]), recognizer.predict(asked)[chosen])
+
+
+def test_where_the_level_says_nothing_values_count_little():
+    shown = draw_trembles(4, seed=3)
+    placed = kineme.Demonstrations.from_arrays(
+        [demo.positions[:, :1] + 9 * k**2 % 23 for k, demo in enumerate(shown)], shown.labels
+    )
+    assert kineme.Recognizer().fit(placed).classifier_.nearest.values.share == min(VALUED)
+    levels = draw_levels(4, seed=5)
+    assert kineme.Recognizer().fit(levels).classifier_.nearest.values.share == max(VALUED)
+
+
+def test_what_is_far_from_all_levels_is_recognized_without_them():
+    shown, asked = draw_trembles(1, seed=1), draw_trembles(3, seed=2)
+    recognizer = kineme.Recognizer().fit(columns_of(shown, 1))
+    moved = kineme.Demonstrations.from_arrays([demo.positions + 1e3 for demo in columns_of(asked, 1)], asked.labels)
+    scores = replace(recognizer.classifier_, values=None).scores
+    expected = recognizer._scores(columns_of(asked, 1), scores) + np.log(0.85)
+    np.testing.assert_allclose(recognizer.decision_function(moved), expected, atol=1e-4)
+
+
+def test_a_column_that_never_changed_tells_nothing():
+    """Whatever it is later: a sensor that was replaced."""
+    shown, asked = draw_levels(2, seed=1), draw_levels(5, seed=2)
+
+    def beside(demos, constant):
+        return kineme.Demonstrations.from_arrays(
+            [np.column_stack((demo.positions, np.full(60, constant))) for demo in demos], demos.labels
+        )
+
+    recognizer = kineme.Recognizer().fit(beside(shown, 1e6))
+    np.testing.assert_allclose(
+        recognizer.predict_proba(beside(asked, -3.0)), recognizer.predict_proba(beside(asked, 1e6)), atol=1e-6
+    )
 
 
 def test_with_profiles_one_class_is_named_everywhere():

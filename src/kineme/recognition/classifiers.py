@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from kineme.recognition.conformal import (
 from kineme.recognition.convolutions import Convolutions, Kernels, fit_convolutions, fit_kernels, series_of, transform
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.describe import Described
+from kineme.similarity.describe import N_MEANS, Described
 from kineme.similarity.scores import Classifier, Compared, most_similar
 from kineme.similarity.similarity import SHARE, AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS, softmax
@@ -41,11 +41,16 @@ _SHARE, _SHARE_AHEAD, _AHEAD = 0.25, 0.5, 0.01
 _SURE = 0.99  # probability of a class by the kernels above which the convolutions would hardly change the answer
 #: Share of profiles in the score. Exercises at a wrist gain more from a half, and smooth paths of joints lose from it.
 PROFILED = 0.25
+#: Shares of recorded values in the score, of which the one is taken by which what is left out is most likely; the first
+#: where nothing can be left out. With it exercises, spoken vowels and activities gain 0.01 to 0.14, and coordinates of
+#: words and strokes and joints of an arm lose 0.00 to 0.03.
+VALUED = (0.15, 0.05, 0.3, 0.5)
 #: `EXPONENT` of these: at one demonstration, 3 to 10 were most likely on the coordinates of five sets and on exercises.
 #: Written words differ; they are right more often than is said.
 _EXPONENT = 8.0
 _LEAST = 1e-9  # of a probability by convolutions
 _NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
+_CONSTANT = 1e-9  # spread of a column, for its size, that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
@@ -82,36 +87,60 @@ class NearestEach(Classifier):
         return Nearest().best(compared) if one_each else super().best(compared)
 
 
+class Values(NamedTuple):
+    """Rows of `recorded_values` of the references in units of each column's spread, and their share of the score."""
+
+    center: Array  # (d, 9), their means
+    spread: Array  # (d, 1), standard deviation in all references; infinite of a column that never changes
+    rows: Array  # (m, 9 d)
+    width: float
+    share: float = VALUED[0]
+
+
 @dataclass(frozen=True, eq=False)
 class NearestProfiled(NearestEach):
-    """The score is that of `NearestEach`, and a share of a kernel on profiles, that of the nearest reference.
+    """The score is that of `NearestEach`, and shares of two kernels: on profiles, and on recorded values.
 
     The profile is the features of random convolutions, `convolutions.transform`, centered at the mean of the references
     and of length 1: it tells which details a movement has, wherever they are. So it is for what is never rotated, and
-    whose parts may come in another order or number, as those of signals and of sensors.
+    whose parts may come in another order or number, as those of signals and of sensors. The values are those that were
+    recorded, `recorded_values`, in units of their spread: at which level, and how far, a signal goes. Where all levels
+    are far from those of the references, they change nothing.
     """
 
     kernels: Kernels = field(repr=False)
     center: Array = field(repr=False)  # (f,)
     profiles: Array = field(repr=False)  # (m, f)
     width: float
+    values: Values | None = field(default=None, repr=False)
     exponent: float = _EXPONENT  # of `class_probabilities`, fitted to these scores
 
     def scores(self, compared: Compared) -> Array:
-        """Return the logarithm of the average of both, (n, C)."""
-        features = transform(series_of(compared.described), self.kernels)
-        return self.with_profiles(compared.nearest_each, _profiles(features, self.center), compared.references)
+        """Return the logarithm of the average of all, (n, C)."""
+        features, values = transform(series_of(compared.described), self.kernels), compared.described.values
+        rows = (
+            None if self.values is None or values is None else _standard(values, self.values.center, self.values.spread)
+        )
+        return self.with_others(compared.nearest_each, _profiles(features, self.center), rows, compared.references)
 
-    def with_profiles(
-        self, by_kernels: Array, profiles: Array, references: References, hidden: NDArray[np.bool_] | None = None
+    def with_others(
+        self,
+        by_kernels: Array,
+        profiles: Array,
+        values: Array | None,
+        references: References,
+        hidden: NDArray[np.bool_] | None = None,
     ) -> Array:
-        """Return scores (n, C), of `by_kernels` and of profiles (n, f) but for pairs with references hidden (n, m)."""
-        cosines = profiles @ self.profiles.T
-        if hidden is not None:
-            cosines[hidden] = -np.inf
-        nearest = np.maximum.reduceat(cosines, references.first, axis=1)
-        by_profile = (np.minimum(nearest, 1.0) - 1.0) / self.width**2  # the squared distance is 2 - 2 cosines
-        return np.logaddexp(np.log(1.0 - PROFILED) + by_kernels, np.log(PROFILED) + by_profile)
+        """Return scores (n, C), of `by_kernels`, profiles (n, f) and rows of values (n, 9 d), if there are any.
+
+        Pairs with references `hidden` (n, m) do not count.
+        """
+        squares = 2.0 - 2.0 * (profiles @ self.profiles.T)
+        scores = _added(by_kernels, PROFILED, _log_nearest(squares, self.width, references, hidden))
+        if values is None or self.values is None:
+            return scores
+        squares = _squares(values, self.values.rows)
+        return _added(scores, self.values.share, _log_nearest(squares, self.values.width, references, hidden))
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
@@ -120,6 +149,30 @@ class NearestProfiled(NearestEach):
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C)."""
         return class_probabilities(scores, self.exponent)
+
+
+def _added(scores: Array, share: float, others: Array) -> Array:
+    """Return the logarithm of the average, with a share of the others."""
+    return np.logaddexp(np.log(1.0 - share) + scores, np.log(share) + others)
+
+
+def _standard(values: Array, center: Array, spread: Array) -> Array:
+    """Return rows (n, 9 d) of values (n, d, 9), whose squared distances are means over the time, and of deviations."""
+    weights = np.append(np.full(N_MEANS, N_MEANS**-0.5), 1.0)
+    return np.asarray(((values - center) / spread * weights).reshape(len(values), -1))
+
+
+def _log_nearest(squares: Array, width: float, references: References, hidden: NDArray[np.bool_] | None) -> Array:
+    """Return the logarithm of a Gaussian of squared distances (n, m) to the nearest reference of each class, (n, C)."""
+    if hidden is not None:
+        squares = np.where(hidden, np.inf, squares)
+    nearest = np.minimum.reduceat(squares, references.first, axis=1)
+    return np.asarray(-0.5 * np.maximum(nearest, 0.0) / width**2)
+
+
+def _squares(rows: Array, others: Array) -> Array:
+    """Return squared distances (n, m)."""
+    return np.asarray((rows**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * rows @ others.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,8 +288,18 @@ def _profiles(features: Array, center: Array) -> Array:
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _NO_PROFILE))
 
 
-def fit_profiled(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> NearestEach:
-    """Return the kernels with profiles of the references; the width is that of any representation, see `SHARE`.
+class LeftOut(NamedTuple):
+    """References, each compared with those of other groups alone."""
+
+    chosen: NDArray[np.intp]  # (k,), which references
+    scores: Array  # (k, C) of `NearestEach`, -inf without others
+    hidden: NDArray[np.bool_]  # (k, m), pairs that are not compared
+    owners: NDArray[np.intp]  # (k,), their classes
+    n_others: NDArray[np.intp]  # (k,), how many others of their class they are compared with
+
+
+def fit_profiled(comparison: Comparison, references: References, left_out: LeftOut) -> NearestEach:
+    """Return the kernels with profiles and values of the references; widths are chosen as for representations.
 
     Without profiles where most have a copy in another class, which leaves a width of rounding, or there is one class.
     """
@@ -245,21 +308,48 @@ def fit_profiled(comparison: Comparison, references: References, groups: NDArray
     features = transform(series, kernels)
     center = features.mean(axis=0)
     profiles = _profiles(features, center)
-    cosines = profiles @ profiles.T
-    cosines[references.labels[:, None] == references.labels] = -np.inf
-    apart = np.sqrt(np.maximum(2.0 - 2.0 * cosines.max(axis=1), 0.0))
-    width = SHARE * float(np.median(apart))
+    width = _width(2.0 - 2.0 * (profiles @ profiles.T), references)
     if not _SAME < width < np.inf:
         return NearestEach()
-    profiled = NearestProfiled(kernels, center, profiles, width)
-    return replace(profiled, exponent=_exponent(profiled, comparison, references, groups))
+    profiled = NearestProfiled(kernels, center, profiles, width, _values(references))
+    exponent, likelihood = _fitted_exponent(profiled, references, left_out)
+    if profiled.values is None or references.counts.min() < FEWEST:
+        return replace(profiled, exponent=exponent)
+    best = replace(profiled, exponent=exponent)
+    for share in VALUED[1:]:
+        other = replace(profiled, values=profiled.values._replace(share=share))
+        exponent, likely = _fitted_exponent(other, references, left_out)
+        if likely > likelihood:
+            best, likelihood = replace(other, exponent=exponent), likely
+    return best
+
+
+def _width(squares: Array, references: References) -> float:
+    """Return the width of a kernel: a share of the median distance to the nearest of another class."""
+    same = references.labels[:, None] == references.labels
+    apart = np.sqrt(np.maximum(np.where(same, np.inf, squares).min(axis=1), 0.0))
+    return SHARE * float(np.median(apart))
+
+
+def _values(references: References) -> Values | None:
+    """Return the recorded values of the references; None where they tell classes no more apart than rounding does."""
+    values = references.described.values
+    if values is None:
+        return None
+    spread = np.sqrt((values[:, :, -1] ** 2).mean(axis=0) + values[:, :, :-1].mean(axis=2).var(axis=0))
+    size = np.abs(values).max(axis=(0, 2))
+    spread[spread <= _CONSTANT * size] = np.inf
+    center, spread = values.mean(axis=0), spread[:, None]
+    rows = _standard(values, center, spread)
+    width = _width(_squares(rows, rows), references)
+    return Values(center, spread, rows, width) if _SAME < width < np.inf else None
 
 
 def fit_best(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> Classifier:
     """Return the kernels, of two demonstrations of each class and more pooled with convolutions if they need help.
 
     Convolutions are for movements that are compared in detail and not rotated there. Signals, and more than three
-    columns that are no points, have profiles beside the kernels, if there are few or many.
+    columns that are no points, have profiles and values beside the kernels, if there are few or many.
     """
     pairs, rotated = references.described.pairs, comparison.procrustes.max_angle > 0
     in_detail = pairs is not None and pairs.details is not None and (pairs.upright or not rotated)
@@ -268,51 +358,63 @@ def fit_best(comparison: Comparison, references: References, groups: NDArray[np.
     if not able or n_classes < 2 or len(references) > MOST:
         return NearestEach()
     profiled = not rotated and comparison.n_dims not in (2, 3) and comparison.mean == "arithmetic"
-    nearest = fit_profiled(comparison, references, groups) if profiled else NearestEach()
-    if references.counts.min() < FEWEST:
+    one_each = references.counts.min() < FEWEST
+    if one_each and not profiled:
+        return NearestEach()
+    chosen = evenly_spaced(len(references), _COMPARED)
+    logs = comparison.similarity.logs(references.described.take(chosen), references.described)
+    groups = comparable_groups(groups)
+    by_groups = _left_out(comparison, references, chosen, logs, groups)
+    nearest = fit_profiled(comparison, references, by_groups) if profiled else NearestEach()
+    if one_each:
         return nearest
-    scores, owners, _ = _left_out(NearestEach(), comparison, references, None)
-    by_kernels = float((scores.argmax(axis=1) == owners).mean())
+    alone = by_groups if groups is None else _left_out(comparison, references, chosen, logs, None)
+    by_kernels = float((alone.scores.argmax(axis=1) == alone.owners).mean())
     if by_kernels >= _ENOUGH and comparison.procrustes.n_points == 1:
         return nearest
     convolutions, by_convolutions = fit_convolutions(comparison, references)
     share = _SHARE_AHEAD if by_convolutions >= by_kernels + _AHEAD else _SHARE
     if isinstance(nearest, NearestProfiled):
         return LogarithmicPool(nearest, convolutions, share, nearest.exponent)
-    exponent = _exponent(nearest, comparison, references, groups)
-    return LogarithmicPool(nearest, convolutions, share, exponent)
+    return LogarithmicPool(nearest, convolutions, share, _fitted_exponent(nearest, references, by_groups)[0])
 
 
-def _exponent(
-    nearest: NearestEach, comparison: Comparison, references: References, groups: NDArray[np.intp] | None
-) -> float:
-    """Return the exponent by which references are most likely, left out with their group, see `fit_exponent`."""
-    scores, owners, n_others = _left_out(nearest, comparison, references, comparable_groups(groups))
+def _fitted_exponent(nearest: NearestEach, references: References, left_out: LeftOut) -> tuple[float, float]:
+    """Return the exponent by which references are most likely, left out with their group, and how likely they are.
+
+    See `fit_exponent`.
+    """
+    chosen, scores, hidden, owners, n_others = left_out
+    if isinstance(nearest, NearestProfiled):
+        values = None if nearest.values is None else nearest.values.rows[chosen]
+        scores = nearest.with_others(scores, nearest.profiles[chosen], values, references, hidden)
     away = distances(scores)
     # As `calibrate` does: with all demonstrations of the class, the nearest would be somewhat nearer.
     away[np.arange(len(owners)), owners] *= (np.maximum(n_others, 1) / references.counts[owners]) ** (1 / DIMENSIONS)
     prior = _EXPONENT if isinstance(nearest, NearestProfiled) else EXPONENT
-    return fit_exponent(away[n_others > 0], owners[n_others > 0], prior)
+    away, owners = away[n_others > 0], owners[n_others > 0]
+    exponent = fit_exponent(away, owners, prior)
+    logs = log_class_probabilities(-0.5 * away**2, exponent)
+    return exponent, float(logs[np.arange(len(owners)), owners].sum())
 
 
 def _left_out(
-    nearest: NearestEach, comparison: Comparison, references: References, groups: NDArray[np.intp] | None
-) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
-    """Return scores (k, C) of references by those of other groups, -inf without; their classes; numbers of others."""
-    chosen = evenly_spaced(len(references), _COMPARED)
+    comparison: Comparison,
+    references: References,
+    chosen: NDArray[np.intp],
+    logs: Array,
+    groups: NDArray[np.intp] | None,
+) -> LeftOut:
+    """Compare chosen references, of which logs (R, k, m) are known, with those of other groups."""
     groups = np.arange(len(references)) if groups is None else groups
     hidden = groups[chosen, None] == groups
-    logs = comparison.similarity.logs(references.described.take(chosen), references.described)
-    logs[:, hidden] = -np.inf
-    each = np.maximum.reduceat(logs, references.first, axis=2)
+    each = np.maximum.reduceat(np.where(hidden, -np.inf, logs), references.first, axis=2)
     alone = np.logical_and.reduceat(hidden, references.first, axis=1)
     each[:, alone] = 0.0  # averages of nothing would be NaN
     scores = np.where(alone, -np.inf, LOG_MEANS[comparison.mean](each))
-    if isinstance(nearest, NearestProfiled):
-        scores = nearest.with_profiles(scores, nearest.profiles[chosen], references, hidden)
     owners = np.searchsorted(references.first, chosen, side="right") - 1
     n_others = np.add.reduceat(~hidden, references.first, axis=1)[np.arange(len(chosen)), owners]
-    return scores, owners, n_others
+    return LeftOut(chosen, scores, hidden, owners, n_others)
 
 
 #: Those in which random convolutions rank the classes, alone or beside the kernels; they tell probabilities, too.

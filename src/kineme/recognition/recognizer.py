@@ -59,7 +59,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     scale : {"path", "per-dimension", "none"}, default "path"
         Normalization of the size, see `Normalization`. With "path", a dot and a circle become equal.
     translation : bool, default True
-        Whether translation is taken out.
+        Whether translation is taken out. Of signals and sensors "auto" counts the recorded values apart.
     cutoff : float or None, default 10.0
         Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
@@ -72,9 +72,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), an "svm" on the averaged kernel, or a ridge regression on random
         "convolutions" of the path. "auto" is "nearest-each", of signals and of more than three columns that are no
-        points with profiles of random convolutions beside it, see `NearestProfiled`; from two demonstrations of each
-        class on both are pooled with "convolutions", see `LogarithmicPool`, unless the kernels recognize practically
-        all that are left out. Whether a movement is known is told by the kernels alone: see
+        points with profiles of random convolutions and recorded values beside it, see `NearestProfiled`; from two
+        demonstrations of each class on all are pooled with "convolutions", see `LogarithmicPool`, unless the kernels
+        recognize practically all that are left out. Whether a movement is known is told by the kernels alone: see
         `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no

@@ -23,7 +23,7 @@ from kineme.movements.trajectories.movements import in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.bounds import ReducedFeatures, Single, log_bounds
-from kineme.similarity.describe import Described, feature_rows, prepare
+from kineme.similarity.describe import Described, describe_as, prepare
 from kineme.similarity.similarity import ALONE, WEIGHTS, AveragedSimilarity, given_weights, impostor_widths, own_weights
 from kineme.similarity.specification import ComparisonSpecification, Normalization, Representation, rotating
 from kineme.validation import Array, check_choice
@@ -88,7 +88,7 @@ class Comparison:
 
     def describe(self, movements: Demonstrations) -> Described:
         """Return movements in the coordinates that were learned, described as the references are."""
-        return self.prepared(feature_rows(movements, self.specification))
+        return describe_as(movements, self, self.procrustes)
 
     def prepared(self, rows: tuple[NDArray[np.floating[Any]], ...]) -> Described:
         """Return feature rows, as from `feature_rows`, ready for comparison."""
@@ -126,8 +126,8 @@ def fit_comparison(
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
     with single_threaded_blas():  # products of few rows: a second thread mostly waits
-        rows = feature_rows(demos, specification)
-        references = References.of(demos, prepare(rows, specification, specification.procrustes(demos.n_dims)), labels)
+        described = describe_as(demos, specification, specification.procrustes(demos.n_dims))
+        references = References.of(demos, described, labels)
         channels = None if demos.channels is None else with_periods(demos.channels, demos.recorded)
         return fit_to_references(specification, references, weights, channels)
 

@@ -40,6 +40,7 @@ _TILE_PAIRS = 100_000  # at a time: a pair's rotation in space has nine numbers
 _TILE_SAMPLES = 200_000  # numbers in one tile of paths: with smaller ones, threads wait for each other
 _MOST_MIXED = 4  # points that are compared pair by pair; of columns that are no points, three times as many
 _MIXED_FROM = 500  # movements that tell which
+N_MEANS, _VALUE_SAMPLES = 8, 64  # of `recorded_values`
 N_POINTS = 199  # even samples from which the phases are computed; every second one is one of 100
 
 
@@ -61,7 +62,33 @@ def describe(movements: Described | MovementsLike, like: Compares | None = None)
         return movements
     how = specification_of(like)
     demos = Demonstrations.of(movements)
-    return prepare(feature_rows(demos, how), how, how.with_points(demos.channels).procrustes(demos.n_dims))
+    return describe_as(demos, how, how.with_points(demos.channels).procrustes(demos.n_dims))
+
+
+def describe_as(demos: Demonstrations, like: Compares, procrustes: Procrustes) -> Described:
+    """Describe movements for a distance that is known, with their `recorded_values` where these count."""
+    how = like.specification
+    return _with_values(prepare(feature_rows(demos, how), like, procrustes), demos, 0, len(demos), how)
+
+
+def _with_values(
+    described: Described, demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
+) -> Described:
+    """Add the values of movements start:stop where they count: of signals and sensors, which are not rotated."""
+    d = demos.n_dims
+    if d in (2, 3) or described.procrustes.n_points > 1 or not (how.detailed and how.normalization.translation):
+        return described
+    return replace(described, values=recorded_values(demos, start, stop))
+
+
+def recorded_values(demos: Demonstrations, start: int, stop: int) -> Array:
+    """Return the means over each eighth of the time, and the standard deviation, of each column as it was recorded.
+
+    Shape (stop - start, d, 9), of movements start:stop.
+    """
+    values = recorded_paths(demos, relative_rows(demos, start, stop, _VALUE_SAMPLES), start)
+    means = values.reshape(len(values), demos.n_dims, N_MEANS, -1).mean(axis=3)
+    return np.concatenate((means, values.std(axis=2, keepdims=True)), axis=2)
 
 
 def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None) -> Described:
@@ -181,7 +208,7 @@ def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, 
     """Describe movements start:stop, all at once."""
     how = like.specification
     paths, rows = _tile_rows(demos, start, stop, how, _precision(how))
-    return Tile(start, stop, paths, prepare(rows, like, procrustes))
+    return Tile(start, stop, paths, _with_values(prepare(rows, like, procrustes), demos, start, stop, how))
 
 
 def describe_paths(paths: Array, details: Array, like: Compares, procrustes: Procrustes) -> Described:
@@ -296,6 +323,7 @@ class Described:
     mean: str = "arithmetic"  # the A-average over representations
     pairs: Pairs | None = None  # for the representations after those, which are compared pair by pair
     own_weights: tuple[float, ...] | None = None  # the weights of the representations themselves; equal if None
+    values: Array | None = None  # (n, d, 9), see `recorded_values`, where these count and movements were at hand
 
     def __len__(self) -> int:
         return len((self.blocks[0] if self.pairs is None else self.pairs.positions).rows)
@@ -312,11 +340,12 @@ class Described:
 
     def take(self, chosen: Any) -> Described:
         """Return the chosen movements: a slice, a mask or indices."""
-        return self._changed(lambda arrays: arrays.take(chosen))
+        values = None if self.values is None else self.values[chosen]
+        return replace(self._changed(lambda arrays: arrays.take(chosen)), values=values)
 
     def empty(self, n: int) -> Described:
         """Make room for n movements that are described in the same way."""
-        return self._changed(lambda arrays: arrays.empty(n))
+        return replace(self._changed(lambda arrays: arrays.empty(n)), values=None)
 
     def put(self, start: int, others: Described) -> None:
         """Write other movements over those from `start` on."""
