@@ -285,7 +285,10 @@ def test_profiles_are_a_quarter_of_the_score():
     rows, learned = rows_of_values(asked, shown), rows_of_values(shown, shown)
     squares = ((rows[:, None] - learned) ** 2).sum(axis=2)
     nearest = np.stack([squares[:, labels == label].min(axis=1) for label in recognizer.classes_], axis=1)
-    expected = np.log(0.85 * score + 0.15 * np.exp(-nearest / (2 * classifier.values.width**2)))
+    between = ((learned[:, None] - learned) ** 2).sum(axis=2)
+    between[labels[:, None] == labels] = np.inf
+    width = 0.4 * np.median(np.sqrt(between.min(axis=1)))
+    expected = np.log(0.85 * score + 0.15 * np.exp(-nearest / (2 * width**2)))
     np.testing.assert_allclose(recognizer.decision_function(asked), expected, rtol=1e-9, atol=1e-9)
 
 
@@ -327,6 +330,8 @@ def test_signals_and_sensors_are_told_apart_by_the_level_at_which_they_are(each,
     assert kineme.Recognizer(classifier="nearest-each").fit(shown).score(asked) < 0.5
     chosen = np.random.default_rng(3).permutation(40)
     np.testing.assert_array_equal(recognizer.predict(asked[chosen]), recognizer.predict(asked)[chosen])
+    described = recognizer.describe(asked)
+    np.testing.assert_array_equal(described.take(chosen).values, described.values[chosen])
 
 
 def test_where_the_level_says_nothing_values_count_little():
