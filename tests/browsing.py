@@ -84,17 +84,23 @@ class Pages:
         page.on("dialog", lambda dialog: self.wrong.append(dialog.message))
         page.on("request", lambda request: self.requests.append(request.url))
 
+    def give_back(self, page):
+        """Leave a page to the next one who wants such a one."""
+        key = next(key for key, used in self.used if used is page)
+        self.used.remove((key, page))
+        if not page.is_closed():
+            page.mouse.up()
+            page.mouse.move(0, 0)
+            page.unroute_all(behavior="ignoreErrors")
+            page.goto("about:blank")
+            self.left.append((key, page))
+
     def leave(self, *allowed):
         """Leave the pages of a test: nothing went wrong, and nothing was asked for elsewhere. What was asked for."""
-        for key, page in self.used:
-            if not page.is_closed():
-                page.mouse.up()
-                page.mouse.move(0, 0)
-                page.unroute_all(behavior="ignoreErrors")
-                page.goto("about:blank")
-                self.left.append((key, page))
+        for _, page in [*self.used]:
+            self.give_back(page)
         wrong, requests = self.wrong, self.requests
-        self.used, self.wrong, self.requests = [], [], []
+        self.wrong, self.requests = [], []
         elsewhere = [url for url in requests if not url.startswith(allowed)]
         assert (wrong, elsewhere) == ([], []), (wrong, elsewhere)
         return requests

@@ -91,11 +91,14 @@ def allowed():
 
 @pytest.fixture
 def opened(pages, studio, allowed):  # studios are ended after their pages
-    """A function that opens a studio; at the end nothing went wrong, and nothing was asked from elsewhere."""
+    """A function that opens a studio; at the end nothing went wrong, and nothing was asked from elsewhere.
+
+    Nothing moves by itself unless a test asks for it: to paint sixty pictures a second takes longer than most tests.
+    """
     addresses = set()
 
-    def open_page(studio, view="draw", **options):
-        page = pages.new(**options)
+    def open_page(studio, view="draw", reduced_motion="reduce", **options):
+        page = pages.new(reduced_motion=reduced_motion, **options)
         addresses.add(studio.address)
         page.goto(f"{studio.address}/?token={studio.token}" + f"#{view}" * bool(view))
         wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")

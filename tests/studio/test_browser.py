@@ -55,7 +55,7 @@ def served_letters(tmp_path_factory):
 
 @pytest.mark.parametrize("shape", LETTERS[: 2 if SOAK else 1])
 def test_a_letter_is_recognized_while_it_is_drawn(opened, served_letters, shape):
-    page = opened(served_letters)
+    page = opened(served_letters, reduced_motion="no-preference")
     assert page.is_hidden("#draw-legend")
     draw(page, letters(shape)[SHOWN], share=0.8)
     assert page.is_visible("#draw-legend")
@@ -620,7 +620,7 @@ def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
 
 
 def test_every_view_fits_its_window(opened, served_letters):
-    page = opened(served_letters, reduced_motion="reduce")
+    page = opened(served_letters)
     for width, view in product(WIDTHS, VIEWS):
         page.set_viewport_size({"width": width, "height": 900})
         show(page, view)
@@ -742,7 +742,7 @@ def test_movements_in_space_turn(opened, studio, tmp_path):
 
 def test_no_rule_of_accessibility_is_broken(opened, studio, tmp_path):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    page = opened(studio(make_letters(tmp_path / "letters", shown=2)), reduced_motion="reduce")
+    page = opened(studio(make_letters(tmp_path / "letters", shown=2)))
     for scheme, rules in (("light", {}), ("dark", {"runOnly": ["color-contrast"]})):  # colors alone differ
         page.emulate_media(color_scheme=scheme)
         for view in VIEWS:
@@ -774,7 +774,7 @@ def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters)
 
 def test_an_arm_executes_a_letter(opened, served_letters):
     pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-    page = opened(served_letters, "robot")
+    page = opened(served_letters, "robot", reduced_motion="no-preference")
     held = []  # arms are asked for before and after the library is there; the first answer comes last
     page.route("**/api/robots", lambda route, _: route.continue_() if held else held.append(route))
     page.reload()
@@ -784,7 +784,8 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     wait_until(page, "document.getElementById('robot-verdict').dataset.state === 'passed'")  # without being asked to
     assert page.locator("#robot-checks tr").count() > 5
     frame = page.frame_locator(".arm-frame")
-    frame.locator("#play:text-is('Pause')").wait_for()  # it moves by itself
+    frame.locator("#play:text-is('Pause')").click()  # it moves by itself
+    page.emulate_media(reduced_motion="reduce")
     assert frame.locator(".chart .limit").count() > 0
     assert page.is_hidden("#robot-dragged")
     with page.expect_download() as given:

@@ -185,7 +185,7 @@ def test_a_table_that_others_wrote_is_replaced_when_that_is_said(opened, tmp_pat
 def test_strips_are_accessible_and_names_are_text(opened, tmp_path, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
     demos = write_drawings(tmp_path / "demos", (0, 1), (2,), tasks=HOSTILE[:2])
-    page = opened(make_library(tmp_path / "actions"), demos, color_scheme=scheme, reduced_motion="reduce")
+    page = opened(make_library(tmp_path / "actions"), demos, color_scheme=scheme)
     page.locator(".strip").nth(0).click()
     wait_for_text(page, "#recording-name", f"Episode 0: {HOSTILE[0]}".strip())
     page.click("#spot")

@@ -102,7 +102,7 @@ def draw_by_finger(page, movement, on):
 @pytest.mark.parametrize("narrow", [False, True])
 def test_a_stranger_is_recognized_after_five_actions(opened, tmp_path, narrow):
     phone = {"width": 390, "height": 600, "has_touch": True, "is_mobile": True, "kind": "phone"}
-    page = opened(tmp_path / "new", **(phone if narrow else {}))
+    page = opened(tmp_path / "new", reduced_motion="no-preference", **(phone if narrow else {}))
     seen = page.inner_text("main")
     assert [word in seen for word in ("Draw it again", "try an example", "or a program", "p-value")] == [1, 1, 0, 0]
     assert page.is_hidden("#ranks")

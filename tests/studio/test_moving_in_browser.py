@@ -156,7 +156,7 @@ def test_two_plain_words_choose_the_formulation_and_advanced_has_all(opened):
 @pytest.mark.parametrize("view", ["move", "robot"])
 @pytest.mark.parametrize("width", [390, 1440])
 def test_the_first_screen_has_few_controls(opened, view, width):
-    page = opened(view, width=width, reduced_motion="reduce")
+    page = opened(view, width=width)
     settle(page)
     controls = page.evaluate(CONTROLS)
     for frame in page.frames[1:]:
@@ -168,7 +168,7 @@ def test_the_first_screen_has_few_controls(opened, view, width):
 def robot(opened):
     """The view Robot with the arm at its movement."""
     pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-    page = opened("robot", reduced_motion="reduce")
+    page = opened("robot")
     wait_until(page, "document.getElementById('robot-verdict').dataset.state === 'passed'")
     wait_until(page, "document.querySelector('.arm-frame').contentWindow.kineme.frames() > 1")
     return page

@@ -225,7 +225,7 @@ def test_a_marker_goes_along_the_shape_and_a_video_of_the_person_beside_it(opene
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_view_and_its_dialog_are_accessible_and_few_controls_are_offered_at_first(opened, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    page = opened(color_scheme=scheme, reduced_motion="reduce")
+    page = opened(color_scheme=scheme)
     enabled = """[...document.querySelectorAll("button, input, select, textarea, a[href], summary")]
       .filter((part) => part.checkVisibility() && !part.disabled).length"""
     assert page.evaluate(enabled) <= 20
