@@ -34,7 +34,7 @@ class Heard:
         self.listener = Listener(library, self.told.append, **options)
         self.clock, self.stamp = 1000.0, 50.0
 
-    def feed(self, rows, columns=PLAIN, block=1):
+    def feed(self, rows, columns=PLAIN, block=5):
         """Rows at 100 Hz, so many at once."""
         for k in range(0, len(rows), block):
             part = rows[k : k + block]
@@ -114,7 +114,7 @@ def test_samples_that_cannot_be_used_are_left_out_counted_and_said_once(library)
     rows[150:160] = np.nan
     rows[200, 0] = np.inf
     rows[201, 1] = 1e200
-    heard = Heard(library).feed(rows)
+    heard = Heard(library).feed(rows, block=1)
     assert heard.ended == ["Sine"]
     assert heard.listener.summary.problems["not finite"] == 12
     assert len(heard.told) == 1
