@@ -93,9 +93,10 @@ def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, 
     for sample in (0, 100, 250, len(tips) - 1):
         page.evaluate("at => kineme.show(at)", float(panda.trajectory.times[sample]))
         np.testing.assert_allclose(page.evaluate("kineme.tip()"), tips[sample], atol=1e-5)
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     before = page.evaluate("kineme.frames()")
     scrub(page, 0.5)
-    assert page.evaluate("kineme.frames()") > before
+    wait_until(page, "before => kineme.frames() > before", before)
     duration = panda.trajectory.duration
     assert page.inner_text("#now") == f"{duration / 2:.2f} s"
     assert page.get_attribute("#time", "aria-valuetext") == f"{duration / 2:.2f} of {duration:.2f} seconds"
@@ -110,7 +111,7 @@ def test_the_canvas_shows_the_arm_and_not_the_ground_alone(opened, panda):
     page = opened(panda)
     colors = page.evaluate(
         """() => new Promise(done => requestAnimationFrame(() => {
-          kineme.show(2); const c = document.getElementById("canvas");
+          kineme.show(2); kineme.picture(); const c = document.getElementById("canvas");
           const flat = new OffscreenCanvas(c.width, c.height).getContext("2d"); flat.drawImage(c, 0, 0);
           const p = flat.getImageData(0, 0, c.width, c.height).data; const count = {blue: 0, orange: 0, green: 0};
           for (let i = 0; i < p.length; i += 4) { const [r, g, b] = [p[i], p[i + 1], p[i + 2]];

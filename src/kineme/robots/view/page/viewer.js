@@ -135,7 +135,7 @@
     const camera = new T.PerspectiveCamera(40, 1, 0.01, 100);
     camera.up.set(0, 0, 1);
     const dark = window.matchMedia("(prefers-color-scheme: dark)");
-    let [grid, held, frames, reach, first] = [null, null, 0, 1, 1];
+    let [grid, held, frames, asked, reach, first] = [null, null, 0, 0, 1, 1];
     let middle = new T.Vector3();
     /** @type {any} What belongs to the movement: the arm, its paths, start and goal. */
     const shown = { arm: null, urdf: "", parts: [], ends: {} };
@@ -184,12 +184,13 @@
       Object.assign(shown, { urdf: data.urdf || shown.urdf, parts, ends, light, approach, movement });
       paint();
       if (isSame) return;
-      fit();
+      resize();
       home();
     }
 
     /** Pixels of a place on the canvas. */
     function onScreen(place) {
+      camera.updateMatrixWorld();
       const { x, y } = place.clone().project(camera);
       return [((1 + x) * canvas.clientWidth) / 2, ((1 - y) * canvas.clientHeight) / 2];
     }
@@ -242,14 +243,18 @@
       controls.update();
       draw();
     }
+    /** At once: a canvas of another size is empty. */
     function fit() {
+      if (resize()) drawNow();
+    }
+    function resize() {
       const { clientWidth, clientHeight } = canvas.parentElement;
-      if (!clientWidth || !clientHeight) return;
+      if (!clientWidth || !clientHeight) return false;
       renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
       renderer.setSize(clientWidth, clientHeight, false);
       camera.aspect = clientWidth / clientHeight;
       camera.updateProjectionMatrix();
-      draw();
+      return true;
     }
     function paint() {
       const lines = dark.matches ? [0x59616b, 0x343a42] : [0xa9afb8, 0xd3d7dd];
@@ -277,7 +282,13 @@
       controls.update();
       draw();
     }
+    /** Draw in the next frame, however often it is asked for until then. */
     function draw() {
+      asked ||= requestAnimationFrame(drawNow);
+    }
+    function drawNow() {
+      cancelAnimationFrame(asked);
+      asked = 0;
       frames += 1;
       renderer.render(world, camera);
     }
@@ -296,7 +307,7 @@
       at: (end) => onScreen(shown.ends[end].position),
       frames: () => frames,
       picture() {
-        draw(); // what was drawn before is no longer there
+        drawNow(); // what was drawn before is no longer there
         return renderer.domElement.toDataURL();
       },
     };
