@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+import pytest
+
 
 def wait_until(page, expression, *arguments, seconds=300):
     """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
@@ -31,6 +33,26 @@ def stroke(page, points, times, lift=True):
     mouse.detach()
     if lift:
         page.mouse.up()
+
+
+def broken_rules(page, **options):
+    """Rules of accessibility that a page breaks, as axe says it."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+    options = {"preload": False, "resultTypes": ["violations"]} | options
+    return axe.Axe().run(page, options=options).response["violations"]
+
+
+def violations(page, **options):
+    """Rules that a page breaks, each with where it does."""
+    return [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in broken_rules(page, **options)]
+
+
+def violations_in_both(page):
+    """Rules that a page breaks by light or in the dark, where colors alone differ; it stays light."""
+    page.emulate_media(color_scheme="dark")
+    dark = violations(page, runOnly=["color-contrast"])
+    page.emulate_media(color_scheme="light")
+    return violations(page) + dark
 
 
 class Pages:

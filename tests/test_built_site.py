@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from browsing import Pages, wait_until
+from browsing import Pages, broken_rules, wait_until
 
 SITE = Path(os.environ.get("KINEME_SITE", "nowhere"))
 pytestmark = pytest.mark.skipif(not (SITE / "search.html").is_file(), reason="KINEME_SITE names no built site")
@@ -161,9 +161,7 @@ def test_what_is_found_is_shown_and_leads_there(searching):
 
 def _serious(page, **options):
     """What axe finds that keeps somebody out."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    found = axe.Axe().run(page, options={"preload": False, "resultTypes": ["violations"]} | options)
-    serious = [one for one in found.response["violations"] if one["impact"] in {"serious", "critical"}]
+    serious = [one for one in broken_rules(page, **options) if one["impact"] in {"serious", "critical"}]
     return [(one["id"], [node["html"][:120] for node in one["nodes"][:3]]) for one in serious]
 
 
