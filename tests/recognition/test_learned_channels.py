@@ -207,7 +207,8 @@ def test_another_width_is_refused_with_what_was_expected(of_poses, of_angles):
         of_poses.predict([bad])
 
 
-def test_movements_learned_as_plain_columns_are_asked_for_as_plain_columns():
+def test_movements_learned_as_plain_columns_are_asked_for_as_plain_columns(monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")  # to compile for seven columns takes longer
     demos = poses()
     plain = Demonstrations.from_arrays(np.split(demos.recorded, demos.offsets[1:-1]), demos.labels)
     assert Recognizer().fit(plain).predict(demos).tolist() == list("ababab")

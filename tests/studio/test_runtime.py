@@ -470,8 +470,10 @@ def worst_turned_answers(runtime):
 
 @cache
 def some_answers_of_points():
-    recognizer = kineme.Recognizer(points=15).fit(draw_shapes([1, 3, 2], 45, seed=3))
-    return answers_of(recognizer, perturbed(draw_shapes([1] * 3, 45, seed=3, spread=0.3), n_points=15))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINEME_COMPILED", "never")  # to compile for these alone would take longer
+        recognizer = kineme.Recognizer(points=15, classifier="nearest-each").fit(draw_shapes([1, 3, 2], 45, seed=3))
+        return answers_of(recognizer, perturbed(draw_shapes([1] * 3, 45, seed=3, spread=0.3), n_points=15))
 
 
 def worst_answers_of_points(runtime):
@@ -528,7 +530,7 @@ WRONG = {
         ("((p % d) * J + Math.floor(p / d))", "p", worst_answers_of_points),
         ("weight * path[", "path[", worst_answers_of_points),
         ("map((x) => x / extent)", "map((x) => (1.001 * x) / extent)", worst_answers_of_points),
-        ("smooth(how.details.cutoff)", "smooth(how.cutoff)", worst_answers),
+        ("smooth(how.details.cutoff, ", "smooth(how.cutoff, ", worst_answers),
         ("how.details.positions)", "{ ...how.details.positions, n_points: 66 })", worst_answers),
     ],
     "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01", worst_answers)],

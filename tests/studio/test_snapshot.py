@@ -151,7 +151,8 @@ def test_of_unequal_symbols_the_large_ones_are_cut(tmp_path):
         ({"rotation_prior": None}, 3, "rotation prior"),
     ],
 )
-def test_what_the_runtime_lacks_is_refused(settings, d, message):
+def test_what_the_runtime_lacks_is_refused(settings, d, message, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", "never")  # to compile for a refusal takes longer than all else
     recognizer = kineme.Recognizer(**settings).fit(draw_shapes([2, 2], d))
     with pytest.raises(SpecificationError, match=message):
         snapshot_of_recognizer(recognizer)

@@ -77,9 +77,9 @@ def test_points_that_turn_together_are_named_while_they_move(tmp_path, open_stud
     """As by a stream of the library, turned in space; a page of such a library is refused in words."""
     monkeypatch.setenv("KINEME_COMPILED", "never")
     R = np.kron(np.eye(2), turn(0.5, 3))
-    movement, recognizer = draw_shapes([1, 1, 1], 6, spread=0.2)[1], Recognizer(points=2)
+    movement, recognizer = draw_shapes([1, 1, 1], 6, spread=0.2)[1], Recognizer(classifier="nearest-each", points=2)
     with ActionLibrary(tmp_path / "hands", create=True, recognizer=recognizer) as library:
-        library.learn(draw_shapes([3, 3, 3], 6))
+        library.learn(draw_shapes([2, 1, 1], 6))
         ours = library.stream(early=DRAWN).update(movement.times, movement.positions @ R.T)
         with pytest.raises(SpecificationError, match="got 6 dimensions, which cannot be drawn"):
             library_page(library, "hands")
