@@ -75,13 +75,13 @@ def as_shown(skill):
     return {f"{what}_{axis}": float(v) for what, place in rows for axis, v in zip("xyz", place, strict=True)}
 
 
-def answering(response):
-    """A client's way to ask the person, who answers so."""
+def answering(*responses):
+    """A client's way to ask the person, who answers so, from question to question."""
     questions = []
 
     async def ask(context, parameters):
         questions.append(parameters)
-        return response
+        return responses[min(len(questions), len(responses)) - 1]
 
     return SimpleNamespace(ask=ask, questions=questions)
 
@@ -450,8 +450,7 @@ def test_identifiers_are_safe_and_differ(names):
     assert grown[0].endswith(ids[0])
 
 
-@pytest.mark.parametrize("count", [150, slow(5000)])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "count"), [("auto", 150), ("legacy", 40), *(slow(mode, 5000) for mode in MODES)])
 def test_hostile_calls_move_nothing(hostile, robot, moves, mode, count):
     skills = SkillTools(hostile, robot, lambda name, movement: moves.append(name) or "moved")
     before = list(skills.tools())
@@ -481,7 +480,7 @@ def test_calls_of_odd_types_are_refused(skills, library):
         skills.call("list_skills", {"a": 1})
 
 
-def over_stdio(act, *arguments, response=YES):
+def over_stdio(act, *arguments, responses=(YES,)):
     """What a client receives that starts the command."""
     source = os.pathsep.join(path for path in sys.path if path)
     parameters = StdioServerParameters(
@@ -490,7 +489,7 @@ def over_stdio(act, *arguments, response=YES):
 
     async def run():
         with anyio.fail_after(120):
-            async with Client(parameters, elicitation_callback=answering(response).ask) as client:
+            async with Client(parameters, elicitation_callback=answering(*responses).ask) as client:
                 return await act(client)
 
     return anyio.run(run)
@@ -529,17 +528,16 @@ def test_the_command_writes_what_was_approved_into_new_files(folder, library, tm
     (goals / "0001-carry.yaml").write_text("mine")
 
     async def act(client):
-        return [await client.call_tool("execute_carry", middle(library)) for _ in range(2)]
+        return [await client.call_tool("execute_carry", middle(library)) for _ in range(3)]
 
     arguments = ("--library", folder, "--robot", "panda", "--allow-execute", "--output", goals)
-    answers = over_stdio(act, *arguments)
+    *answers, declined = over_stdio(act, *arguments, responses=(YES, YES, ElicitResult(action="decline")))
     assert not [answer.content[0].text for answer in answers if answer.is_error]
     assert sorted(path.name for path in goals.iterdir()) == ["0001-carry.yaml", "0002-carry.yaml", "0003-carry.yaml"]
     assert (goals / "0001-carry.yaml").read_text() == "mine"
     second, third = (json.loads((goals / f"000{k}-carry.yaml").read_text())["trajectory"]["points"] for k in (2, 3))
     assert third[0]["positions"] == pytest.approx(second[-1]["positions"])  # each begins where the one before ends
-    assert over_stdio(act, *arguments, response=ElicitResult(action="decline"))[0].is_error
-    assert len(list(goals.iterdir())) == 3
+    assert declined.is_error
 
 
 def test_names_of_files_do_not_leave_the_folder(hostile, robot, tmp_path):
