@@ -36,7 +36,10 @@ def test_wrong_labels_of_digits_are_found_and_few_others(digits, share, least):
     """The rates that docs/guide/outliers.md tells of: without the contrast, or with one neighbor, fewer are found."""
     demos, _ = digits
     rng = np.random.default_rng(4)
-    runs = [(*counts(demos, *wrongly_labeled(demos.labels, share, rng)), round(share * len(demos))) for _ in range(4 if SOAK else 2)]
+    runs = [
+        (*counts(demos, *wrongly_labeled(demos.labels, share, rng)), round(share * len(demos)))
+        for _ in range(4 if SOAK else 2)
+    ]
     n_detected, n_others, n_planted = np.sum(runs, axis=0)
     assert n_detected >= least * n_planted
     assert n_others <= 0.05 * (n_detected + n_others)

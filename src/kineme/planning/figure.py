@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -170,6 +171,12 @@ class _Film:
         self.axes.locator_params(nbins=4)
         self.axes.set(**dict(zip(("xlim", "ylim", "zlim"), zip(low, high, strict=True), strict=True)))
         self.axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        moving = [self.shadow, self.path, self.arm, self.mark, *chain(*self.things.values()), *self.said, self.title]
+        moving.sort(key=lambda artist: artist.zorder)
+        for artist in moving:
+            artist.set_animated(True)
+        canvas.draw()  # what stays is drawn once
+        behind = canvas.copy_from_bbox(self.figure.bbox)
         for points, row in zip(links, rows.tolist(), strict=True):
             self.arm.set_data_3d(*points.T)
             self.shadow.set_data_3d(*points.T[:2], np.full(len(points), low[2]))
@@ -190,7 +197,9 @@ class _Film:
                 text.set(text=line, color=color)
             with warnings.catch_warnings():  # a character that the font lacks is drawn as a box
                 warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
-                canvas.draw()
+                canvas.restore_region(behind)
+                for artist in moving:
+                    self.figure.draw_artist(artist)
             yield np.array(canvas.buffer_rgba())
 
 
