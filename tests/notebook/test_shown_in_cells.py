@@ -34,19 +34,19 @@ def shown(thing):
 
 
 @pytest.mark.parametrize(
-    ("thing", "n_pictures"),
+    ("make", "n_pictures"),
     [
-        (DEMOS, 3),
-        (DEMOS[0], 1),
-        (kineme.DMP().learn(DEMOS), 6),
-        (kineme.DMP().learn(DEMOS).rollout(), 3),
-        (kineme.Recognizer().fit(DEMOS), 3),
-        (kineme.Recognizer().fit(DEMOS).recognize(DEMOS[2]), 3),  # it, its nearest example, and the runner-up
+        (lambda: DEMOS, 3),
+        (lambda: DEMOS[0], 1),
+        (lambda: kineme.DMP().learn(DEMOS), 6),
+        (lambda: kineme.DMP().learn(DEMOS).rollout(), 3),
+        (lambda: kineme.Recognizer().fit(DEMOS), 3),
+        (lambda: kineme.Recognizer().fit(DEMOS).recognize(DEMOS[2]), 3),  # it, its nearest example, and the runner-up
     ],
     ids=["demonstrations", "movement", "primitives", "rollout", "recognizer", "answer"],
 )
-def test_movements_are_shown_with_their_pictures(thing, n_pictures):
-    elements, text = shown(thing)
+def test_movements_are_shown_with_their_pictures(make, n_pictures):
+    elements, text = shown(make())
     assert len(elements.findall(".//svg")) == n_pictures
     assert "currentColor" in text
     assert len(text) < 8_000
