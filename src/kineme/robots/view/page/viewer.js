@@ -259,7 +259,7 @@
     function paint() {
       const lines = dark.matches ? [0x59616b, 0x343a42] : [0xa9afb8, 0xd3d7dd];
       world.background = new T.Color(dark.matches ? 0x1e2226 : 0xf4f5f7);
-      shown.light.material.opacity = dark.matches ? 0.8 : 0.5;
+      if (shown.light) shown.light.material.opacity = dark.matches ? 0.8 : 0.5;
       if (grid) world.remove(grid);
       grid = new T.GridHelper(2.4 * Math.max(reach, 0.2), 24, ...lines);
       grid.rotation.x = Math.PI / 2;
