@@ -312,16 +312,12 @@ def fit_profiled(comparison: Comparison, references: References, left_out: LeftO
     if not _SAME < width < np.inf:
         return NearestEach()
     profiled = NearestProfiled(kernels, center, profiles, width, _values(references))
-    exponent, likelihood = _fitted_exponent(profiled, references, left_out)
-    if profiled.values is None or references.counts.min() < FEWEST:
-        return replace(profiled, exponent=exponent)
-    best = replace(profiled, exponent=exponent)
-    for share in VALUED[1:]:
-        other = replace(profiled, values=profiled.values._replace(share=share))
-        exponent, likely = _fitted_exponent(other, references, left_out)
-        if likely > likelihood:
-            best, likelihood = replace(other, exponent=exponent), likely
-    return best
+    tried = [profiled]
+    if profiled.values is not None and references.counts.min() >= FEWEST:
+        tried = [replace(profiled, values=profiled.values._replace(share=share)) for share in VALUED]
+    fits = [_fitted_exponent(each, references, left_out) for each in tried]
+    best = max(range(len(fits)), key=lambda k: fits[k][1])  # of the most likely the first
+    return replace(tried[best], exponent=fits[best][0])
 
 
 def _width(squares: Array, references: References) -> float:
