@@ -96,16 +96,18 @@ def digits(gestures):
 
 @pytest.fixture(scope="module")
 def browser():
-    """Chromium of the system, or of the path in the environment variable CHROMIUM.
+    """Chromium of the system, its headless shell if that is there, or of the path in the environment variable CHROMIUM.
 
     One for each module: while Playwright has its own event loop, a test can run no other.
     """
     playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-    path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    names = "chromium-headless-shell", "chromium", "google-chrome"
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
     if path is None:
         pytest.skip("no chromium is installed")
     with playwright.sync_playwright() as started:
-        # Painted without an emulated graphics card, which takes longer; WebGL has one all the same.
-        browser = started.chromium.launch(executable_path=path, headless=True, args=["--disable-gpu"])
+        # Painted without an emulated graphics card, which takes longer, as a process of its own does; WebGL has one.
+        painting = ["--disable-gpu", "--in-process-gpu"]
+        browser = started.chromium.launch(executable_path=path, headless=True, args=painting)
         yield browser
         browser.close()
