@@ -52,6 +52,7 @@ SUBJECTS = (
     "pieces",
     "operators",
     "tensors",
+    "gpu",
     "exported",
     "page",
     "migrating",

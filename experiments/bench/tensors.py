@@ -17,7 +17,6 @@ from bench.rows import Row
 from bench.timing import medians
 
 DIMS, N, RATE, DURATION, BATCH = 7, 25, 100.0, 2.0, 1024
-LARGE = 100_000  # movements at once on a GPU
 PRODMP = {
     "num_basis": N, "basis_bandwidth_factor": 3, "num_basis_outside": 0, "alpha_phase": 3, "alpha": 25, "dt": 0.01
 }  # fmt: skip
@@ -35,13 +34,13 @@ def measure(quick: bool) -> list[Row]:
     torch.set_num_threads(1)
     batch = 64 if quick else BATCH
     rows = [*_rows(1, 5 if quick else 15, (20.0, 20.0, 20.0)), *_rows(batch, 2 if quick else 7, (20.0, 10.0, 500.0))]
-    return [*rows, *_arrays_row(batch, 5 if quick else 20), *_gpu_rows(quick)]
+    return [*rows, *_arrays_row(batch, 5 if quick else 20)]
 
 
 def _rows(n: int, repeats: int, targets: tuple[float, float, float]) -> list[Row]:
-    ours, theirs = _ours(n), _theirs(n)
+    works, theirs = ours(n), _theirs(n)
     rows = []
-    for (name, work), target in zip(ours.items(), targets, strict=True):
+    for (name, work), target in zip(works.items(), targets, strict=True):
         few = name == "learning" and n > 1  # a peer's takes half a minute
         calls = 20 if n == 1 else 1  # of a tenth of a millisecond: what a cold start costs is not what is asked
         rivals = {who: _repeated(one, calls) for who, one in (("ours", work), (PEER, theirs[name]))}
@@ -61,7 +60,8 @@ def _repeated(work: Callable[[], object], calls: int) -> Callable[[], object]:
     return several
 
 
-def _numbers(n: int, device: str = "cpu") -> tuple[Any, ...]:
+def numbers(n: int, device: str = "cpu") -> tuple[Any, ...]:
+    """Weights, starts and goals."""
     import torch
 
     generator = torch.Generator().manual_seed(0)
@@ -69,9 +69,10 @@ def _numbers(n: int, device: str = "cpu") -> tuple[Any, ...]:
     return tuple(torch.randn(shape, generator=generator).to(device) for shape in shapes)
 
 
-def _ours(n: int, device: str = "cpu") -> dict[str, Callable[[], object]]:
+def ours(n: int, device: str = "cpu") -> dict[str, Callable[[], object]]:
+    """What the module does, by name."""
     mp = kineme.torch.Primitive(DIMS, N, rate=RATE, duration=DURATION, device=device)
-    weights, start, goal = _numbers(n, device)
+    weights, start, goal = numbers(n, device)
     leaf, paths = weights.clone().requires_grad_(), mp(weights, start, goal).contiguous()
 
     def rollout(w: Any = weights) -> tuple[Any, ...]:
@@ -89,7 +90,7 @@ def _theirs(n: int) -> dict[str, Callable[[], object]]:
     from mp_pytorch.mp import MPFactory
 
     mp = MPFactory.init_mp("prodmp", PRODMP, num_dof=DIMS, tau=DURATION)
-    weights, start, goal = _numbers(n)
+    weights, start, goal = numbers(n)
     params = torch.cat((weights, goal[..., None]), dim=-1).flatten(1)
     leaf, times = params.clone().requires_grad_(), torch.linspace(0.0, DURATION, 201).expand(n, 201)
 
@@ -112,38 +113,12 @@ def _theirs(n: int) -> dict[str, Callable[[], object]]:
 
 def _arrays_row(n: int, repeats: int) -> list[Row]:
     """The same rollout by NumPy, which has no gradients: how much the module adds."""
-    primitives = kineme.DMP(n_basis=N).learn(_numbers(n)[0].numpy().transpose(0, 2, 1))
+    primitives = kineme.DMP(n_basis=N).learn(numbers(n)[0].numpy().transpose(0, 2, 1))
 
     def rollout() -> tuple[Any, ...]:
         movement = primitives.rollout(n_samples=201)
         return movement.positions, movement.velocities
 
-    seconds = medians({"tensors": _ours(n)["rollout"], "arrays": rollout}, repeats)
+    seconds = medians({"tensors": ours(n)["rollout"], "arrays": rollout}, repeats)
     tensors, arrays = (1e3 * seconds[name] for name in ("tensors", "arrays"))
     return [Row(f"rollout, {n} at once, beside arrays in double precision", "ms", tensors, arrays, "kineme.DMP")]
-
-
-def _gpu_rows(quick: bool) -> list[Row]:
-    """A large batch on a GPU beside this machine's processor."""
-    import torch
-
-    if not torch.cuda.is_available():
-        print("GPU: not measured", file=sys.stderr)
-        return []
-    n, device = 10_000 if quick else LARGE, torch.cuda.get_device_name()
-    works = [
-        (name, _ours(n)[name], _ours(n, "cuda")[name]) for name in ("rollout", "rollout and gradients", "learning")
-    ]
-    rows = []
-    for name, here, there in works:
-
-        def finished(work: Callable[[], object] = there) -> object:
-            result = work()
-            torch.cuda.synchronize()
-            return result
-
-        seconds = medians({"gpu": finished, "cpu": here[name]}, 3)
-        ms, cpu_ms = 1e3 * seconds["gpu"], 1e3 * seconds["cpu"]
-        cores = f"{torch.get_num_threads()} cores"
-        rows.append(Row(f"{name}, {n} at once, on {device}", "ms", ms, cpu_ms, cores, cpu_ms / ms, (">=", 50.0)))
-    return rows

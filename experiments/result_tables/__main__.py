@@ -13,6 +13,7 @@ from result_tables import adapting as adapting_tables
 from result_tables import beside as beside_tables
 from result_tables import concepts as concept_tables
 from result_tables import exported, large_archives, motion_layer, planning
+from result_tables import gpu as gpu_tables
 from result_tables import modulation as modulation_tables
 from result_tables import outliers as outlier_tables
 from result_tables import people as people_tables
@@ -20,7 +21,7 @@ from result_tables import sensors as sensor_tables
 from result_tables.measured import DOCS, RESULTS, figures, fill, rows, table
 
 #: Pages of the guide with one table or a few.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables, sensor_tables)
+GUIDES = (adapting_tables, gpu_tables, modulation_tables, outlier_tables, sensor_tables)
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "the defaults": ("", ("defaults",)),

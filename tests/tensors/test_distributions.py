@@ -99,3 +99,12 @@ def test_what_is_no_distribution_is_refused():
         mp.log_prob(mp(mean, start, goal), mean, chol, noise=0.0)
     with pytest.raises(SpecificationError, match="expected size"):
         mp.sample(0, mean, chol, start, goal)
+
+
+def test_a_matrix_that_cannot_be_decomposed_gives_nan_for_its_movement_alone():
+    """As NaN does: an error would look at values."""
+    mp = module()
+    mean, chol, start, goal = _weights(3)
+    positions = mp(mean, start, goal)
+    chol[1] = torch.nan
+    assert torch.isnan(mp.log_prob(positions, mean, chol)).tolist() == [False, True, False]

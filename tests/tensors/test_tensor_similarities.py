@@ -98,6 +98,9 @@ def test_similarities_are_mapped_and_compiled_and_look_at_no_values():
     )
     assert torch.allclose(compiled(a, b)[0], similarity(a, b))
     assert torch.allclose(compiled(a, b)[1], gram(TRE, a[:, 0], b[:, 0]))
+    compiled = torch.compile(similarity, backend="aot_eager", fullgraph=True)
+    for prior in (RotationPrior(vertical=(0, 0, 1)), RotationPrior(concentration=2.0)):
+        assert torch.allclose(compiled(a, b, prior), similarity(a, b, prior))
     meta = torch.empty(4, 9, 3, device="meta")
     assert similarity(meta, meta).shape == (4,)
     assert gram(KERNELS[-1], meta[:, 0]).shape == (4, 4)

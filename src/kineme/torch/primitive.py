@@ -320,10 +320,10 @@ class Primitive(torch.nn.Module):
         numbers, tau = self._numbers(weights, origin, goal, rest, duration)
         u = self._number(at) / tau
         now = torch.stack((position, self._vector("velocity", velocity) * tau[..., None]), dim=-1)
-        difference = (now - self._states(numbers, u))[..., None, :, :]  # (..., 1, d, 2)
         h = self._u - u[..., None]
-        free = (self._transition(h.clamp(min=0.0))[..., None, :, :] @ difference[..., None])[..., 0]  # (..., T, d, 2)
-        change = -self._K * free[..., 0] - self._D * free[..., 1] if derivative == 2 else free[..., derivative]
+        free = self._transition(h.clamp(min=0.0))  # (..., T, 2, 2)
+        row = -self._K * free[..., 0, :] - self._D * free[..., 1, :] if derivative == 2 else free[..., derivative, :]
+        change = row @ (now - self._states(numbers, u)).mT  # (..., T, d)
         driven = self._path(numbers, tau, derivative)
         before = position if derivative == 0 else rest
         # Times are rounded: a sample at `at` itself must not count as before.
@@ -411,7 +411,7 @@ class Primitive(torch.nn.Module):
         velocity, duration : as in `forward`
         noise : float, default 0.01
             Standard deviation of each number, in the unit of the positions; in single precision not much below a
-            thousandth of the extent.
+            thousandth of the extent, where rounding may leave NaN.
         """
         check_number("noise", noise, above=0.0)
         self._relative(positions)  # which checks them
@@ -423,7 +423,8 @@ class Primitive(torch.nn.Module):
         factor = (self._within @ self._factor(chol, start, goal)).flatten(-3, -2)
         n_inside, n_numbers = factor.shape[-2], self.n_samples * self.dims
         covariance = factor @ factor.mT + noise**2 * torch.eye(n_inside, dtype=factor.dtype, device=factor.device)
-        L = torch.linalg.cholesky(covariance)
+        L, failed = torch.linalg.cholesky_ex(covariance)  # which does not wait for a GPU to look at it
+        L = L.masked_fill(failed[..., None, None] != 0, math.nan)
         whitened = torch.linalg.solve_triangular(L, inside.flatten(-2)[..., None], upper=False)
         squares = whitened.square().sum(dim=(-1, -2)) + outside / noise**2
         log_volume = L.diagonal(dim1=-2, dim2=-1).log().sum(-1) + (n_numbers - n_inside) * math.log(noise)
@@ -487,7 +488,9 @@ class Primitive(torch.nn.Module):
         return amplitude if self.counts_per_distance else None
 
     def _number(self, value: Tensor | float) -> Tensor:
-        return torch.as_tensor(value, dtype=self._u.dtype, device=self._u.device)
+        how = {"dtype": self._u.dtype, "device": self._u.device}
+        # A number is written there: it would be copied to a GPU otherwise, for which a graph cannot be captured.
+        return torch.full((), value, **how) if isinstance(value, (int, float)) else torch.as_tensor(value, **how)
 
     def _vector(self, name: str, value: Tensor | None, *shape: int) -> Tensor:
         """A given or learned tensor, in the precision of the module."""

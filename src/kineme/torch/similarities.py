@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -100,13 +101,21 @@ def similarity(a: Tensor, b: Tensor, prior: RotationPrior | None = None) -> Tens
     M = a.mT @ b
     if d not in (2, 3):
         return M.diagonal(dim1=-2, dim2=-1).sum(-1)
-    F = torch.as_tensor((prior or RotationPrior()).matrix(d), dtype=M.dtype, device=M.device)
+    F = _written((prior or RotationPrior()).matrix(d), M)
     M, cost = M + F, F.trace()
     if d == 2:
         along, across = M[..., 0, 0] + M[..., 1, 1], M[..., 1, 0] - M[..., 0, 1]
         return (along.square() + across.square() + _SMALL).sqrt() - cost
     values = torch.linalg.svdvals(M)
     return values[..., 0] + values[..., 1] + torch.linalg.det(M).sign() * values[..., 2] - cost
+
+
+def _written(matrix: Any, like: Tensor) -> Tensor:
+    """Return a matrix of NumPy's on the device of a tensor: number by number, as the processor waits for a copy."""
+    how = {"dtype": like.dtype, "device": like.device}
+    if torch.compiler.is_compiling():  # the matrix is then a constant of the program
+        return torch.as_tensor(matrix, **how)
+    return torch.stack([torch.full((), entry, **how) for entry in matrix.ravel().tolist()]).reshape(matrix.shape)
 
 
 def _unit(movement: Tensor) -> Tensor:
