@@ -149,8 +149,7 @@ class Plan:
     def queries(self, reduced: NDArray[Any]) -> list[Query]:
         """Return rows (n, W), each as a query."""
         rows, marks = reduced.astype(np.float64), self.marks(reduced)
-        # Columns chosen by an index lie one after the other: the search would be compiled for those, too.
-        squares, residuals = (np.take(rows, self.begins[1:] - back, axis=1) for back in (2, 1))
+        squares, residuals = (np.take(rows, self.begins[1:] - k, axis=1) for k in (2, 1))  # contiguous rows
         return [Query(*parts) for parts in zip(marks, rows, squares, residuals, strict=True)]
 
     def index(self, reduced: Single) -> tuple[Index, Rows]:
