@@ -228,6 +228,15 @@ def test_least_squares_without_negative_weights_are_those_of_scipy(seed, n, rank
         np.testing.assert_allclose(w, expected, rtol=1e-4, atol=1e-6 * max(1.0, expected.max()))
 
 
+def test_least_squares_of_columns_that_are_alike_are_solved_exactly():
+    """To come as near step by step takes hundreds of sweeps."""
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        A, b = 0.05 * rng.normal(size=(20, 7)) + rng.normal(size=(20, 1)), rng.normal(size=20)
+        expected = nnls(A, b)[0]
+        np.testing.assert_allclose(_nonnegative_least_squares(A.T @ A, A.T @ b), expected, rtol=0, atol=1e-10)
+
+
 def test_half_of_a_fitted_weight_is_the_representations_own():
     demos = draw_shapes([6] * 4, seed=3, spread=0.4)
     described, labels = describe(demos), np.asarray(demos.labels)

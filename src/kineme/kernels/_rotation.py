@@ -69,7 +69,8 @@ def _solve(lanes, c, s):  # type: ignore[no-untyped-def]
         if not _step_at_limit(lanes, c / s):
             break
     _finish_at_limit(lanes, c, s)
-    lanes.moving[:] = lanes.inside
+    for lane in range(_LANES):  # a slice would compile the text of an error
+        lanes.moving[lane] = lanes.inside[lane]
     for _ in range(STEPS):
         if not _step_within(lanes):
             break

@@ -97,10 +97,11 @@ def _scan_block(index, b, slacks, query, plan, work, top, first_row):  # type: i
     best, rows, state = top
     size, mean = marks.shape[2], codes[0]
     for r in range(len(halves)):
-        _fill_logs(marks[b], query[0], (ends[r], ends[r + 1]), (logs[r], halves[r], slacks[b, r]), sums)
+        how, into = (logs[r], halves[r], slacks[b, r]), sums if r else totals
+        _fill_logs(marks[b], query[0], (ends[r], ends[r + 1]), how, into)
         if r == 0:
-            totals[:] = sums
-        elif mean == 0:
+            continue
+        if mean == 0:
             for i in range(size):
                 totals[i] = _joined(totals[i], sums[i], 0)
         else:

@@ -224,7 +224,7 @@ class Simulation:
         course, stopped, failure = _course(movement.trajectory, self.gripper), None, None
         samples: list[_Sample] = []
         k = 0
-        while self._moves(k - len(course.joints)):
+        while k < len(course.joints) or self._moves(k - len(course.joints)):
             self._advance(course, min(k, len(course.joints) - 1))
             if k % _LOOKS == 0:
                 samples.append(self._sample(k * _STEP - movement.begins))
@@ -287,7 +287,7 @@ class Simulation:
         wanted, needed = np.zeros((2, self._model.nv))
         wanted[:n] = course.accelerations[k] + _DAMPING * lag + _STIFFNESS * off
         self._mujoco.mj_mulM(self._model, data, needed, wanted)
-        data.qfrc_applied[:n] = np.clip(needed[:n] + data.qfrc_bias[:n], -self._most, self._most)
+        data.qfrc_applied[:n] = np.minimum(np.maximum(needed[:n] + data.qfrc_bias[:n], -self._most), self._most)
 
     def _sample(self, time: float) -> _Sample:
         data, n = self._data, self.robot.n_joints

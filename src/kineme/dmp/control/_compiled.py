@@ -23,10 +23,10 @@ def advance(spring, table, avoidance, state, u, du, influences, motion):  # type
     if len(obstacles):
         _steer(avoidance, state, obstacles, velocities, 0.0, total)
         _carry(spring, table, state, u, 0.5 * du, goal, rate, ratio, total, shape, end)
-        total[:] = push
+        total = push.copy()  # total[:] = push compiles an error, for seconds
         _steer(avoidance, end, obstacles, velocities, 0.5 * du, total)
     _carry(spring, table, state, u, du, goal, rate, ratio, total, shape, end)
-    total[:] = push
+    total = push.copy()
     _steer(avoidance, end, obstacles, velocities, du, total)
     _look_up(table, u + du, shape)
     for k in range(d):

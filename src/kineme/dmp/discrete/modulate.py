@@ -30,7 +30,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from kineme.dmp.control.plan import MISSED, Plan, ViaPlaces, check_one
 from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_at, smoothness_factor
@@ -407,6 +406,8 @@ def _inside_between(
 
 def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tuple[int, int]) -> Array:
     """The shortest z (r,) with ``low <= path + effect @ z <= high``; `where` is for the message."""
+    from scipy.optimize import nnls  # takes a quarter of a second to load
+
     low, high = limits
     G, h = np.vstack((effect, -effect)), np.concatenate((low - path, path - high))  # G z >= h
     size = np.linalg.norm(G, axis=1)
