@@ -236,12 +236,7 @@ def check_steps(
 
 
 def _movement(
-    problem: Problem,
-    step: Step,
-    library: ActionLibrary,
-    robot: Robot,
-    joints: Array | None,
-    how: tuple[Frame, str],
+    problem: Problem, step: Step, library: ActionLibrary, robot: Robot, joints: Array | None, how: tuple[Frame, str]
 ) -> RobotMovement:
     """Return the movement of a step on the arm, from where its joints stand, by default from where the step begins."""
     domain = problem.domain
@@ -288,14 +283,7 @@ class _Way(NamedTuple):
 class _Executor:
     """The state of one execution."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        library: ActionLibrary,
-        world: World,
-        robot: Robot,
-        options: Options,
-    ) -> None:
+    def __init__(self, plan: Plan, library: ActionLibrary, world: World, robot: Robot, options: Options) -> None:
         self.plan, self.library, self.world, self.robot, self.options = plan, library, world, robot, options
         self.places = dict(plan.problem.places)  # as they were seen last
         self.attempts: list[Attempt] = []

@@ -43,10 +43,7 @@ def earlier(stored: Hypotheses, movement: Demonstrations, label: int) -> Earlier
     own = slice(int(ends[label]), int(ends[label + 1]))
     size, tempo = (
         float(mine[-1] - np.median(theirs[G - 1 :: G][own]))
-        for mine, theirs in (
-            (begun.log_lengths, stored.log_lengths),
-            (begun.log_durations, stored.log_durations),
-        )
+        for mine, theirs in ((begun.log_lengths, stored.log_lengths), (begun.log_durations, stored.log_durations))
     )
     return Earlier(label, begun, size, tempo)
 
