@@ -69,15 +69,18 @@ class Pages:
 
     def new(
         self,
-        width=1440,
-        height=900,
+        width=1024,
+        height=640,
         tolerated=(),
         reduced_motion="no-preference",
         color_scheme="light",
         kind="",
         **options,
     ):
-        """An empty page; messages of its console with one of the tolerated texts are no errors."""
+        """An empty page; messages of its console with one of the tolerated texts are no errors.
+
+        Its window is no larger than most tests need, as larger ones take longer to paint.
+        """
         key = (kind, *sorted(options.items()))
         at = next((k for k, (left, _) in enumerate(self.left) if left == key), None)
         page = self._opened(options) if at is None else self.left.pop(at)[1]

@@ -118,7 +118,7 @@ def pages(browser):
 
 @pytest.fixture(scope="module")
 def searching(pages):
-    page = pages.new()
+    page = pages.new(width=1440, height=900)
     page.goto((SITE / "search.html").resolve().as_uri())
     wait_until(page, "Search.hasIndex()")
     return page
@@ -189,7 +189,7 @@ def test_no_serious_rule_of_accessibility_is_broken(shown):
 
 def test_colors_can_be_read_in_the_dark_and_pictures_keep_theirs(pages):
     """Colors alone differ from those by day; the theme would make pictures gray."""
-    page = pages.new(color_scheme="dark")
+    page = pages.new(width=1440, height=900, color_scheme="dark")
     for kind in (*COLORED, *PICTURED):
         page.goto((SITE / f"{kind}.html").resolve().as_uri())
         if kind in COLORED:
@@ -229,7 +229,7 @@ def test_no_page_is_longer_than_six_thousand_pixels(pages):
 
 
 def test_the_first_page_has_one_to_draw_in_by_light_and_in_the_dark(pages):
-    page = pages.new(color_scheme="dark")
+    page = pages.new(width=1440, height=900, color_scheme="dark")
     page.goto((SITE / "index.html").resolve().as_uri())
     assert page.locator("iframe.draw-here").get_attribute("src") == "_static/draw-dark.html"
     page.evaluate("document.documentElement.dataset.theme = 'light'")

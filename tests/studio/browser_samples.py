@@ -96,7 +96,7 @@ def settle(page):
         wait_until(page, "window.unanswered === 0")
 
 
-def draw(page, movement, seconds=1.6, n=40, share=1.0, on="#draw-canvas"):
+def draw(page, movement, seconds=1.6, n=25, share=1.0, on="#draw-canvas"):
     """Draw a movement by the mouse, all of it in `seconds`; with a share, begin it and hold the button."""
     box = page.locator(on).bounding_box()
     size = np.ptp(movement.positions, axis=0)

@@ -9,8 +9,9 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import uvicorn
@@ -85,12 +86,26 @@ class Running:
         return self.process.returncode, self.line + out, err
 
 
+def _listening(ports):
+    """A socket at one of the ports that others have left, or at a new one."""
+    while ports:
+        with suppress(OSError):  # another process may have taken it
+            return socket.create_server(("127.0.0.1", ports.pop()))
+    return socket.create_server(("127.0.0.1", 0))
+
+
 class Served:
-    """A studio of this process, served in a thread: it begins at once, where `Running` imports everything first."""
+    """A studio of this process, served in a thread: it begins at once, where `Running` imports everything first.
+
+    It listens where one that has ended did, so that a browser asks only whether the files that it has are the same.
+    """
+
+    left: ClassVar[list[int]] = []  # ports
 
     def __init__(self, folder, **options):
-        self.token, self._socket = TOKEN, socket.create_server(("127.0.0.1", 0))
-        self.address = f"http://127.0.0.1:{self._socket.getsockname()[1]}"
+        self.token, self._socket = TOKEN, _listening(self.left)
+        self._port = self._socket.getsockname()[1]
+        self.address = f"http://127.0.0.1:{self._port}"
         self._server = uvicorn.Server(config_of(create_app(folder, TOKEN, **options)))
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)
         self._thread.start()  # what comes before it listens waits in the socket
@@ -100,6 +115,7 @@ class Served:
         self._server.should_exit = True
         self._thread.join(300)
         self._socket.close()
+        self.left.append(self._port)
 
 
 @contextmanager

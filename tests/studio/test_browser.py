@@ -29,7 +29,7 @@ from browser_samples import (
     show,
     wait_for_text,
 )  # fmt: skip
-from studio_samples import ROOT, Running, Served, drawing, running
+from studio_samples import ROOT, Running, Served, drawing
 
 import kineme
 from browsing import violations_in_both, wait_until
@@ -295,7 +295,7 @@ def test_a_long_name_leaves_room_for_the_table_of_names_that_are_mixed_up(opened
 
 def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studio, tmp_path):
     running = studio(make_letters(tmp_path / "letters", shown=3))
-    page = opened(running, "library")
+    page = opened(running, "library", width=1440, height=900)
     names = page.locator(".card-name")
     wait_until(page, "document.querySelectorAll('.card-open').length === 4")
     page.check("#choosing")
@@ -599,24 +599,24 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
         assert [len(library[name].members) for name in ("from a file", "of a file")] == [1, 2]
 
 
-def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
+def test_the_server_may_be_killed_and_comes_back(opened, studio, tmp_path):
     folder = make_letters(tmp_path / "letters", shown=2)
-    studio = Running(folder, "--port", _free_port())  # where it listens again
-    page = opened(studio, tolerated=("net::ERR_", "WebSocket connection"))
+    killed = Running(folder, "--port", _free_port())
+    page = opened(killed, tolerated=("net::ERR_", "WebSocket connection"))
     draw(page, letters("GShape")[SHOWN], share=0.9)
     wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'GShape'")
-    studio.end(signal.SIGKILL)
+    killed.end(signal.SIGKILL)
     wait_until(page, "!document.getElementById('away-note').hidden")
     page.mouse.up()
     wait_for_text(page, "#verdict-kind", "No answer yet")
-    with running(folder, "--port", studio.address.rpartition(":")[2]):
-        wait_until(page, "document.getElementById('away-note').hidden")
-        wait_until(page, ANSWERED)  # what was drawn is sent anew, from its beginning
-        assert page.inner_text(".rank:first-child .rank-name") == "GShape"
-        draw(page, letters("CShape")[SHOWN])
-        wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'CShape'")
-        wait_until(page, ANSWERED)
-        page.close()
+    Served.left.append(int(killed.address.rpartition(":")[2]))
+    assert studio(folder).address == killed.address
+    wait_until(page, "document.getElementById('away-note').hidden")
+    wait_until(page, ANSWERED)  # what was drawn is sent anew, from its beginning
+    assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+    draw(page, letters("CShape")[SHOWN])
+    wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'CShape'")
+    wait_until(page, ANSWERED)
 
 
 def test_every_view_fits_its_window(opened, served_letters):
@@ -770,7 +770,8 @@ def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters)
 
 def test_an_arm_executes_a_letter(opened, served_letters):
     pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-    page = opened(served_letters, "robot", reduced_motion="no-preference")
+    page = opened(served_letters, reduced_motion="no-preference")
+    page.evaluate("history.replaceState(null, '', '#robot')")  # shown when it is loaded again
     held = []  # arms are asked for before and after the library is there; the first answer comes last
     page.route("**/api/robots", lambda route, _: route.continue_() if held else held.append(route))
     page.reload()
@@ -791,7 +792,7 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     page.set_viewport_size({"width": 390, "height": 844})
     inside = page.frames[-1]  # as high as what is in it
     wait_until(inside, "document.documentElement.scrollHeight <= innerHeight && innerHeight > 500")
-    page.set_viewport_size({"width": 1440, "height": 900})
+    page.set_viewport_size({"width": 1024, "height": 640})
     page.locator("#tab-robot").press("3")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
     page.locator(".handle.goal").press("Shift+ArrowLeft")

@@ -8,7 +8,7 @@ import csv
 import pytest
 from browser_samples import FILM, HOSTILE, ROW, center, settle, wait_for_text
 from episode_samples import CAMERA, write_drawings
-from studio_samples import make_library
+from studio_samples import Served, make_library
 
 from browsing import violations_in_both, wait_until
 
@@ -28,9 +28,11 @@ def film(pages):
 
 @pytest.fixture
 def opened(opened, studio):
-    """A function that opens a studio of recordings."""
+    """A function that opens a studio of recordings, in a window that has room for strips and a timeline."""
 
     def open_page(library, recordings, **options):
+        Served.left.clear()  # a browser keeps the videos of an address for an hour
+        options = {"width": 1440, "height": 900} | options
         page = opened(studio(library, recordings=recordings), "recordings", **options)
         wait_until(page, "!document.getElementById('episodes').hidden")
         settle(page)

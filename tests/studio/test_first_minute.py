@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -141,9 +142,7 @@ def test_an_example_is_learned_and_another_hand_is_told_what_its_letters_look_li
 
 
 def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples, tmp_path):
-    with kineme.ActionLibrary(tmp_path / "own", create=True) as library:
-        library.learn(load_example("letters"))
-    page = opened(tmp_path / "own")
+    page = opened(copytree(examples / "letters", tmp_path / "own"))
     draw(page, strokes("G"))
     wait_until(page, ANSWERED)
     page.click("#why summary")
@@ -163,10 +162,8 @@ def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples
     assert f"{100 * explained.nearest.differences.max():.0f} % of its size" in captions[0]
 
 
-def test_what_is_taken_back_is_asked_again(opened, tmp_path):
-    page = opened(tmp_path / "new")
-    page.click("text=Letters")
-    wait_until(page, "document.querySelectorAll('#known-symbols li').length === 10")
+def test_what_is_taken_back_is_asked_again(opened, examples, tmp_path):
+    page = opened(copytree(examples / "letters", tmp_path / "own"))
     draw(page, strokes("C"))
     wait_until(page, ANSWERED)
     page.click("text=Yes, it is C")

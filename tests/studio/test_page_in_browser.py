@@ -66,7 +66,7 @@ def opened(tabs, pages):
 
 def draw(page, shape="GShape", index=5, until=1.0):
     """Draw a recorded letter, in a second or so; the mouse stays down where it is not drawn to its end."""
-    x = kineme.load_lasa([shape])[index].positions[::16]
+    x = kineme.load_lasa([shape])[index].positions[::32]
     x = (x - (x.min(axis=0) + x.max(axis=0)) / 2) / np.ptp(x, axis=0).max()
     box = page.locator("#stage").bounding_box()
     size = 0.6 * min(box["width"], box["height"])
@@ -166,7 +166,7 @@ def test_a_scribble_is_unknown_and_a_dot_is_asked_again(opened):
     page.mouse.move(box["x"] + 200, box["y"] + 200)
     page.mouse.down()
     for point in rng.uniform(100, 500, (25, 2)):
-        page.mouse.move(box["x"] + point[0], box["y"] + point[1], steps=3)
+        page.mouse.move(box["x"] + point[0], box["y"] + point[1])
     page.mouse.up()
     assert page.locator("#verdict").inner_text() == "Unknown"
     page.mouse.click(box["x"] + 30, box["y"] + 30)
