@@ -46,7 +46,7 @@ check: lint
 	$(PYTEST) $(CHECKED)
 
 test: $(DEV)/ready
-	$(MAKE) --no-print-directory -j 2 warm lint collect
+	$(MAKE) --no-print-directory -j 3 warm lint collect
 	$(PYTEST) -rs
 
 lint: $(DEV)/ready
@@ -118,7 +118,8 @@ $(DEV)/ready: requirements/dev.txt pyproject.toml $(DEV)/python
 	test "$$now" = "$$(cat $@ 2>/dev/null)" || echo "$$now" > $@
 
 # The packages of a lock file, which names all that they need, each checked against its hash, then this project on top. One
-# pip waits for each file and unpacks on one core: three take less time. Bytecode is written by what loads a module first.
+# pip waits for each file and unpacks on one core: three take less time. Bytecode is written by what loads a module first,
+# but of texts that the compiler warns of: in tests warnings are errors.
 define environment
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kineme needs Python 3.11 or later, found " + sys.version.split()[0] + "; choose one with: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import ensurepip' || { echo "This Python cannot create environments; on Debian: apt-get install python3-venv"; exit 1; }
@@ -128,6 +129,7 @@ define environment
 	@awk '/^[^ ]/ { part = ++n % 3 } { print > "$(1)/part" part ".txt" }' $(2)
 	ls $(1)/part*.txt | xargs -n 1 -P 3 $(1)/bin/pip install --quiet --no-compile --no-deps --require-hashes -r
 	$(1)/bin/pip install --quiet --no-deps --no-build-isolation --editable .
+	-$(1)/bin/python -m compileall -q -q $(1)/lib/python3.*/site-packages/toppra
 	touch $@
 endef
 
