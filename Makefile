@@ -38,7 +38,7 @@ CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/dmp/discrete tests/d
   $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
   tests/io/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
 
-# In the order of the folders: the modules that come last are short, and leave no worker idle. Three workers on two cores,
+# The examples of the documentation, then in the order of the folders: what comes last is short, and leaves no worker idle. Three workers on two cores,
 # as many tests wait for a process that they started. Threads of BLAS would wait actively for a core of another worker.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(DEV)/bin/pytest -n 3 --dist loadscope --no-loadscope-reorder
 
@@ -118,15 +118,15 @@ $(DEV)/ready: requirements/dev.txt pyproject.toml $(DEV)/python
 	test "$$now" = "$$(cat $@ 2>/dev/null)" || echo "$$now" > $@
 
 # The packages of a lock file, which names all that they need, each checked against its hash, then this project on top. One
-# pip waits for each file and unpacks on one core: three take less time. Bytecode is written by what loads a module first,
-# but of texts that the compiler warns of: in tests warnings are errors.
+# pip waits for each file and unpacks on one core: three take less time. Python writes bytecode when it first loads a module;
+# toppra is compiled here, as the compiler warns of it, and in tests a warning is an error.
 define environment
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kineme needs Python 3.11 or later, found " + sys.version.split()[0] + "; choose one with: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import ensurepip' || { echo "This Python cannot create environments; on Debian: apt-get install python3-venv"; exit 1; }
 	@cp $(1)/python $(1).python
 	$(PYTHON) -m venv --clear $(1)
 	@mv $(1).python $(1)/python
-	@awk '/^[^ ]/ { part = ++n % 3 } { print > "$(1)/part" part ".txt" }' $(2)
+	@awk '/^[^ ]/ { part = ++n % 3 } { print > ("$(1)/part" part ".txt") }' $(2)
 	ls $(1)/part*.txt | xargs -n 1 -P 3 $(1)/bin/pip install --quiet --no-compile --no-deps --require-hashes -r
 	$(1)/bin/pip install --quiet --no-deps --no-build-isolation --editable .
 	-$(1)/bin/python -m compileall -q -q $(1)/lib/python3.*/site-packages/toppra

@@ -25,7 +25,7 @@ settings.load_profile("deterministic")
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave repetitions to `make soak`; a test that is named has all its cases. Pages come first: they take longest."""
+    """Leave repetitions to `make soak`; a test that is named has all its cases. Examples of the docs come first."""
     items.sort(key=lambda item: item.path.name != "test_examples.py")  # else one worker ends alone with them
     if SOAK or any("::" in argument for argument in config.args):
         return

@@ -18,7 +18,8 @@ def chromium(asks: str) -> Iterator[Any]:
     asks : str
         Which benchmark needs it.
     """
-    path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    names = "chromium-headless-shell", "chromium", "google-chrome"
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:

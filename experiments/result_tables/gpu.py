@@ -34,4 +34,4 @@ def _cell(gpu: float, processor: float | None) -> str:
 
 def _short(ms: float) -> str:
     """Two digits, all of a whole number."""
-    return f"{ms:.0f}" if ms >= 10 else f"{ms:.2g}"
+    return f"{ms:,.0f}" if ms >= 10 else f"{ms:.2g}"

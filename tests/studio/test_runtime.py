@@ -95,7 +95,7 @@ kept = []
 
 
 def snapshot_of(recognizer):
-    """Of the recognizer that was asked for last, its snapshot is kept: it holds all beginnings."""
+    """Return the snapshot, kept for the recognizer that was asked for last: it holds all beginnings."""
     if not kept or kept[0] is not recognizer:
         kept[:] = recognizer, snapshot_of_recognizer(recognizer)
     return kept[1]

@@ -144,6 +144,7 @@ def test_a_phone_without_sensors_says_so_and_breaks_no_rule_of_accessibility(ope
     for shown in (page, phone):
         shown.emulate_media(reduced_motion="reduce")  # colors change at once
         assert violations_in_both(shown) == []
+    phone.context.clear_permissions()
 
 
 #: A gamepad whose stick is pushed once around, with a button held.

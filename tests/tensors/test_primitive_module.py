@@ -210,6 +210,8 @@ def test_what_cannot_be_used_is_refused():
         mp(weights, start)
     with pytest.raises(SpecificationError, match="expected derivative to be 0, 1 or 2, got 3"):
         mp(weights, start, goal, derivative=3)
+    with pytest.raises(SpecificationError, match="expected derivative to be 0, 1 or 2, got 3"):
+        mp.replan(weights, at=0.2, position=start, velocity=start, goal=goal, derivative=3)
     with pytest.raises(TrajectoryError, match=r"expected positions \(..., 29, 2\), got \(30, 2\); kineme.Resample"):
         mp.encode(torch.zeros(30, 2))
     with pytest.raises(SpecificationError, match="expected no preprocessing"):

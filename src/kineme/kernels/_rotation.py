@@ -69,7 +69,7 @@ def _solve(lanes, c, s):  # type: ignore[no-untyped-def]
         if not _step_at_limit(lanes, c / s):
             break
     _finish_at_limit(lanes, c, s)
-    for lane in range(_LANES):  # a slice would compile the text of an error
+    for lane in range(_LANES):  # a slice would compile its error message, for seconds
         lanes.moving[lane] = lanes.inside[lane]
     for _ in range(STEPS):
         if not _step_within(lanes):

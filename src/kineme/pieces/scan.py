@@ -149,7 +149,8 @@ class Plan:
     def queries(self, reduced: NDArray[Any]) -> list[Query]:
         """Return rows (n, W), each as a query."""
         rows, marks = reduced.astype(np.float64), self.marks(reduced)
-        squares, residuals = (np.take(rows, self.begins[1:] - k, axis=1) for k in (2, 1))  # contiguous rows
+        # Contiguous, as all else: for another layout the scan would be compiled again.
+        squares, residuals = (np.take(rows, self.begins[1:] - k, axis=1) for k in (2, 1))
         return [Query(*parts) for parts in zip(marks, rows, squares, residuals, strict=True)]
 
     def index(self, reduced: Single) -> tuple[Index, Rows]:

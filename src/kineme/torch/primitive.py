@@ -322,9 +322,9 @@ class Primitive(torch.nn.Module):
         now = torch.stack((position, self._vector("velocity", velocity) * tau[..., None]), dim=-1)
         h = self._u - u[..., None]
         free = self._transition(h.clamp(min=0.0))  # (..., T, 2, 2)
+        driven = self._path(numbers, tau, derivative)
         row = -self._K * free[..., 0, :] - self._D * free[..., 1, :] if derivative == 2 else free[..., derivative, :]
         change = row @ (now - self._states(numbers, u)).mT  # (..., T, d)
-        driven = self._path(numbers, tau, derivative)
         before = position if derivative == 0 else rest
         # Times are rounded: a sample at `at` itself must not count as before.
         began = (h > -16 * torch.finfo(h.dtype).eps)[..., None]
@@ -489,7 +489,7 @@ class Primitive(torch.nn.Module):
 
     def _number(self, value: Tensor | float) -> Tensor:
         how = {"dtype": self._u.dtype, "device": self._u.device}
-        # A number is written there: it would be copied to a GPU otherwise, for which a graph cannot be captured.
+        # `full` writes a number on the device; `as_tensor` would copy it there, which a CUDA graph cannot capture.
         return torch.full((), value, **how) if isinstance(value, (int, float)) else torch.as_tensor(value, **how)
 
     def _vector(self, name: str, value: Tensor | None, *shape: int) -> Tensor:

@@ -111,9 +111,9 @@ def similarity(a: Tensor, b: Tensor, prior: RotationPrior | None = None) -> Tens
 
 
 def _written(matrix: Any, like: Tensor) -> Tensor:
-    """Return a matrix of NumPy's on the device of a tensor: number by number, as the processor waits for a copy."""
+    """Return a matrix of NumPy's on the device of a tensor; on a GPU number by number, as it waits for a copy."""
     how = {"dtype": like.dtype, "device": like.device}
-    if torch.compiler.is_compiling():  # the matrix is then a constant of the program
+    if like.device.type == "cpu" or torch.compiler.is_compiling():  # compiled, it is a constant of the program
         return torch.as_tensor(matrix, **how)
     return torch.stack([torch.full((), entry, **how) for entry in matrix.ravel().tolist()]).reshape(matrix.shape)
 

@@ -23,7 +23,7 @@ def advance(spring, table, avoidance, state, u, du, influences, motion):  # type
     if len(obstacles):
         _steer(avoidance, state, obstacles, velocities, 0.0, total)
         _carry(spring, table, state, u, 0.5 * du, goal, rate, ratio, total, shape, end)
-        total = push.copy()  # total[:] = push compiles an error, for seconds
+        total = push.copy()  # a slice would compile its error message, for seconds
         _steer(avoidance, end, obstacles, velocities, 0.5 * du, total)
     _carry(spring, table, state, u, du, goal, rate, ratio, total, shape, end)
     total = push.copy()
