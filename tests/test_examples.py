@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 import shlex
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -24,6 +25,14 @@ MODULES = [
 ]  # fmt: skip
 
 
+@pytest.fixture
+def no_figures():
+    """Pages show figures of pyplot, if others have loaded it, and it warns of the twenty-first that is open."""
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
+
+
+@pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_pages_run_and_print_what_they_show(page, tmp_path):
     steps = list(walk(page, tmp_path))
