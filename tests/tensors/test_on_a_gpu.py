@@ -73,7 +73,12 @@ def _moved(numbers, device, dtype):
     return [part.to(device, dtype).requires_grad_() for part in numbers]
 
 
-@pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-9), (torch.float32, 2e-3)], ids=repr)
+@pytest.mark.parametrize(
+    ("device", "dtype", "tolerance"),
+    [("cpu", torch.float32, 2e-3), ("cuda", torch.float32, 2e-3), ("cuda", torch.float64, 1e-9)],
+    indirect=["device"],
+    ids=repr,
+)
 @pytest.mark.parametrize("what", [*FORMULATIONS, "actions"])
 def test_results_and_gradients_are_those_of_the_processor(device, what, dtype, tolerance):
     numbers = _numbers()
