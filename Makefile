@@ -38,8 +38,9 @@ CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/dmp/discrete tests/d
   $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
   tests/io/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
 
-# The examples of the documentation, then in the order of the folders: what comes last is short, and leaves no worker idle. Three workers on two cores,
-# as many tests wait for a process that they started. Threads of BLAS would wait actively for a core of another worker.
+# The examples of the documentation, then in the order of the folders: what comes last is short, and leaves no worker idle.
+# Three workers on two cores, as many tests wait for a process that they started. Threads of BLAS would wait actively for
+# a core of another worker.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(DEV)/bin/pytest -n 3 --dist loadscope --no-loadscope-reorder
 
 check: lint

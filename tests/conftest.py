@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -97,13 +96,14 @@ def digits(gestures):
 
 @pytest.fixture(scope="module")
 def browser():
-    """Chromium of the system, its headless shell if that is there, or of the path in the environment variable CHROMIUM.
+    """Chromium, of the path that benchmarks take.
 
     One for each module: while Playwright has its own event loop, a test can run no other.
     """
+    from bench.browser import chromium_path
+
     playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-    names = "chromium-headless-shell", "chromium", "google-chrome"
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+    path = chromium_path()
     if path is None:
         pytest.skip("no chromium is installed")
     with playwright.sync_playwright() as started:

@@ -9,6 +9,12 @@ from contextlib import contextmanager
 from typing import Any
 
 
+def chromium_path() -> str | None:
+    """Path of Chromium: that in the environment variable CHROMIUM, or the system's, its headless shell first."""
+    names = "chromium-headless-shell", "chromium", "google-chrome"
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+
+
 @contextmanager
 def chromium(asks: str) -> Iterator[Any]:
     """Headless Chromium, or the program in the environment variable CHROMIUM; None, and a line why, without it.
@@ -18,8 +24,7 @@ def chromium(asks: str) -> Iterator[Any]:
     asks : str
         Which benchmark needs it.
     """
-    names = "chromium-headless-shell", "chromium", "google-chrome"
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+    path = chromium_path()
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:

@@ -36,9 +36,9 @@ def _rows(n: int) -> list[Row]:
     import torch
 
     card, cores = torch.cuda.get_device_name(), f"{torch.get_num_threads()} cores"
-    calls, rows = SIZES[n], []
+    calls, rows, on_processor = SIZES[n], [], _works(n, "cpu")
     for name, work in _works(n, "cuda").items():
-        here = _works(n, "cpu").get(name)
+        here = on_processor.get(name)
         rivals = {"gpu": partial(_finished, work, calls)}
         if here is not None:
             rivals["cpu"] = partial(_repeated, here, calls)

@@ -69,6 +69,13 @@ def _results(what="original", **options):
     return partial(*chosen)
 
 
+def assert_close(results, expected, tolerance):
+    """Each result is the expected one within `tolerance` of its largest number."""
+    assert results.keys() == expected.keys()
+    for name, part in expected.items():
+        assert torch.allclose(results[name], part, atol=tolerance * float(part.abs().max()), rtol=0), name
+
+
 def _moved(numbers, device, dtype):
     return [part.to(device, dtype).requires_grad_() for part in numbers]
 
@@ -92,10 +99,8 @@ def test_results_and_gradients_are_those_of_the_processor(device, what, dtype, t
         loss = sum((part / sizes[name]).square().sum() for name, part in results.items())
         gradients = torch.autograd.grad(loss, leaves, allow_unused=what == "actions")
         slopes.append([slope.cpu().double() for slope in gradients if slope is not None])
-    for name, part in found[0].items():
-        assert torch.allclose(found[1][name], part, atol=tolerance * float(part.abs().max()), rtol=0), name
-    for k, (here, there) in enumerate(zip(*slopes, strict=True)):
-        assert torch.allclose(there, here, atol=5 * tolerance * float(here.abs().max()), rtol=0), k
+    assert_close(found[1], found[0], tolerance)
+    assert_close(*(dict(enumerate(parts)) for parts in reversed(slopes)), 5 * tolerance)
 
 
 def test_samples_are_drawn_there(device):
@@ -127,13 +132,10 @@ def test_the_processor_waits_for_nothing_and_a_graph_repeats_it(gpu, what):
             part.copy_(0.7 * other)
         graph.replay()
         expected = work(*numbers)
-    for name, part in expected.items():
-        assert torch.allclose(results[name], part, atol=1e-9 * float(part.abs().max())), name
+    assert_close(results, expected, 1e-9)
 
 
 @pytest.mark.parametrize("what", ["bio-inspired", "original", "actions"])
 def test_what_is_compiled_for_it_is_the_same(gpu, what):
     work, numbers = _results(what, device=gpu), [part.to(gpu) for part in _numbers()]
-    expected = work(*numbers)
-    for name, part in torch.compile(work, fullgraph=True)(*numbers).items():
-        assert torch.allclose(part, expected[name], atol=1e-9 * float(expected[name].abs().max())), name
+    assert_close(torch.compile(work, fullgraph=True)(*numbers), work(*numbers), 1e-9)
