@@ -109,6 +109,7 @@ def browser():
     with playwright.sync_playwright() as started:
         # Painted without an emulated graphics card, which takes longer, as a process of its own does; WebGL has one.
         painting = ["--disable-gpu", "--in-process-gpu"]
-        browser = started.chromium.launch(executable_path=path, headless=True, args=painting)
+        one_renderer = ["--process-per-site", "--renderer-process-limit=1"]  # each page would start one again
+        browser = started.chromium.launch(executable_path=path, headless=True, args=painting + one_renderer)
         yield browser
         browser.close()
