@@ -25,9 +25,9 @@ from bench.people import recorded
 from bench.rows import Row
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.answer import fit_known_classes
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, fit_best
+from kineme.recognition.classifiers import BY_CONVOLUTIONS
 from kineme.recognition.conformal import EXPONENT, LEAST, class_probabilities, distances
-from kineme.similarity.comparison import References
+from kineme.similarity.comparison import References, fit_to_references
 from kineme.similarity.describe import Described, describe
 from kineme.similarity.scores import nearest, score
 from kineme.similarity.specification import ComparisonSpecification
@@ -138,8 +138,8 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
     shown = split.templates
     references = References.of(one.demos[shown], one.described.take(shown), one.labels[shown])
     groups = np.unique(one.people[shown], return_inverse=True)[1] if grouped else None
-    recognizer = fit_known_classes(_SPECIFICATION, references, groups=groups)
-    classifier, calibration = fit_best(recognizer.comparison, recognizer.references, groups), recognizer.calibration
+    recognizer = fit_known_classes(*fit_to_references(_SPECIFICATION, references), "auto", groups)
+    classifier, calibration = recognizer.classifier, recognizer.calibration
     truth = np.searchsorted(references.classes, one.labels[split.known])
     logs, novelty, rejected = [], [], []
     for asked in (split.known, split.unknown):

@@ -14,6 +14,7 @@ from kineme.library import calibration_cache
 from kineme.library import reduced_features_cache as features_cache
 from kineme.library.recognize import LibraryRecognizer
 from kineme.recognition import two_stage_search as sampled_calibration
+from kineme.recognition.classifiers import LogarithmicPool, NearestProfiled
 from kineme.recognition.conformal import distances
 from kineme.similarity.comparison import StoredReferences
 
@@ -61,14 +62,24 @@ def make(tmp_path):
         library.close()
 
 
-@pytest.mark.parametrize("counts", [[1] * 6, [10] * 4, [1, 2, 5, 9]])
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts, d):
-    demos, questions = _kinds(counts, d), _questions(counts, d)
-    recognizer = Recognizer(representations=make().specification.representations).fit(demos)
-    order = np.argsort(demos.labels, kind="stable")
-    for ours, theirs in zip(make(demos).recognize(questions), recognizer.recognize(questions), strict=True):
-        assert ours.label == theirs.label
+@pytest.mark.parametrize(
+    ("counts", "d", "spread", "classifier"),
+    [(counts, d, 0.05, None) for counts in ([1] * 6, [10] * 4, [1, 2, 5, 9]) for d in (1, 2, 3)]
+    + [([1] * 4, 6, 0.05, NearestProfiled), ([2] * 6, 6, 1.0, LogarithmicPool), ([4] * 6, 2, 0.4, LogarithmicPool)],
+)
+def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts, d, spread, classifier):
+    demos, questions = _kinds(counts, d, spread=spread), _questions(counts, d)
+    library, order = make(), np.argsort(demos.labels, kind="stable")
+    people = None if classifier is None else [f"person {i % 2}" for i in range(len(demos))]
+    library.learn(demos, groups=people)
+    recognizer = Recognizer(representations=library.specification.representations).fit(demos, groups=people)
+    if classifier is not None:
+        assert {type(recognizer.classifier_), type(LibraryRecognizer(library.store).current().model.classifier)} == {
+            classifier
+        }
+    for ours, theirs in zip(library.recognize(questions), recognizer.recognize(questions), strict=True):
+        assert (ours.label, ours.ranked) == (theirs.label, theirs.ranked)
+        assert ours.probabilities == pytest.approx(theirs.probabilities, abs=1e-4)
         assert ours.p_values == pytest.approx(theirs.p_values, abs=1e-4)
         assert [neighbor.index - 1 for neighbor in ours.nearest] == [
             order[neighbor.index] for neighbor in theirs.nearest

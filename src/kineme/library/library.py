@@ -303,8 +303,9 @@ class ActionLibrary:
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
-        With up to 2500 movements of symbols, all are compared as in `kineme.Recognizer`. With more, some hundreds are,
-        which are chosen by bounds from the reduced features of all, and p-values are given for the 64 nearest symbols.
+        With up to 1000 movements of symbols, answers are those of `kineme.Recognizer`. With up to 2500 all are
+        compared, too, by "auto" with its kernels alone. With more, some hundreds are, which are chosen by bounds from
+        the reduced features of all, and p-values are given for the 64 nearest symbols.
         The label is then that of the single nearest movement, as with ``classifier="nearest"``, whichever the library
         was created with. It is the one of comparing all if no representation compares pairs; else nearly always, as the
         bounds say nothing of those, see `kineme.recognition.two_stage_search.TwoStageSearch`. The first answer after a

@@ -20,13 +20,15 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, Calibrates, KnownClasses, Neighbor, fit_known_classes, is_one
+from kineme.recognition.classifiers import by_kernels
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, hypotheses
 from kineme.recognition.early.stream import Decision, Live
 from kineme.recognition.monitor import Monitor, corridor, jitter
 from kineme.recognition.two_stage_search import TwoStageSearch
 from kineme.sampling import evenly_spaced
-from kineme.similarity.comparison import StoredReferences
+from kineme.similarity.comparison import StoredReferences, fit_to_references
+from kineme.similarity.describe import with_values
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
 #: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
@@ -78,7 +80,8 @@ class LibraryRecognizer:
                 members = members_of(self.store)
                 if len(members.ids) <= self.exhaustive:
                     calibrate_by = partial(calibrated_once, self.store, members)
-                    self._current = Current(version, members.ids, known_members(self.store, members, calibrate_by))
+                    model = known_members(self.store, members, calibrate_by, kernels_alone=False)
+                    self._current = Current(version, members.ids, model)
                 else:
                     reduced = self._reduced = open_cache(self.store, self._reduced)
                     self._current = Current(version, reduced.ids, two_stages(self.store, reduced, members))
@@ -117,16 +120,25 @@ def some_of_each_symbol(store: Store) -> KnownClasses:
 
 
 def known_members(
-    store: Store, members: Members, calibrate_by: Calibrates = calibrate, in_memory: bool = True
+    store: Store,
+    members: Members,
+    calibrate_by: Calibrates = calibrate,
+    in_memory: bool = True,
+    kernels_alone: bool = True,
 ) -> KnownClasses:
-    """Recognize symbols by these members, with their stored features; samples are read when asked for, or now."""
+    """Recognize symbols by these members, with their stored features; samples are read when asked for, or now.
+
+    Unless it is by `kernels_alone`, all of "auto" recognizes them, as in `Recognizer`.
+    """
     how = store.specification
     references = described_references(store, members.ids, members.labels)
     if in_memory:
-        references = replace(references, demonstrations=read.movements(store, members.ids))
-    return fit_known_classes(
-        how.comparison, references, how.weights, how.classifier, members.groups, store.channels, calibrate_by
-    )
+        demos = read.movements(store, members.ids)
+        described = with_values(references.described, demos, 0, len(demos), how.comparison)
+        references = replace(references, demonstrations=demos, described=described)
+    classifier = by_kernels(how.classifier) if kernels_alone else how.classifier
+    fitted = fit_to_references(how.comparison, references, how.weights, store.channels)
+    return fit_known_classes(*fitted, classifier, members.groups, calibrate_by)
 
 
 def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:

@@ -12,17 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
 from kineme.recognition import explanation
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, NearestEach, fit_classifier
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, KERNELS, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
 from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
-from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison, fit_to_references
+from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison
 from kineme.similarity.describe import Described, Tile, even_paths, fit_maps, recorded_paths
 from kineme.similarity.scores import Classifier, Compared, for_compared, nearest, score
 from kineme.similarity.similarity import AveragedSimilarity
@@ -456,7 +455,7 @@ class KnownClasses:
 
 
 def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
-    """Return the records of a fitted recognizer, or those fitted to labeled movements with the default parameters.
+    """Return the records of a fitted recognizer, or the default kernels fitted to labeled movements.
 
     Raises `sklearn.exceptions.NotFittedError` (a recognizer that is not fitted) and `TrajectoryError` (movements
     without labels).
@@ -466,35 +465,22 @@ def known_classes(symbols: FittedRecognizer | MovementsLike) -> KnownClasses:
         calibration = fitted.calibration()  # first: it refuses a recognizer that is not fitted
         return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
     demos = Demonstrations.of(symbols)
-    return _known(*fit_comparison(ComparisonSpecification(), demos, check_labels(demos, None)), "auto")
+    return fit_known_classes(*fit_comparison(ComparisonSpecification(), demos, check_labels(demos, None)), KERNELS)
 
 
-def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
-    specification: ComparisonSpecification,
-    references: References,
-    weights: str | Sequence[float] = "auto",
-    classifier: str = "auto",
-    groups: NDArray[np.intp] | None = None,
-    channels: Channels | None = None,
-    calibrated: Calibrates = calibrate,
-) -> KnownClasses:
-    """Fit to references that are described already, see `kineme.similarity.comparison.fit_to_references`.
-
-    With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
-    `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.
-    """
-    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups, calibrated)
-
-
-def _known(
+def fit_known_classes(
     comparison: Comparison,
     references: References,
     classifier: str,
     groups: NDArray[np.intp] | None = None,
     calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
+    """Fit a classifier to references of a fitted comparison; `groups` as in `kineme.Recognizer.fit`.
+
+    `calibrated` may keep calibrations.
+    """
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
-        fitted = fit_classifier(classifier, comparison, references)
+        fitted = fit_classifier(classifier, comparison, references, groups)
         calibration = calibrated(comparison.similarity, references, groups)
     return KnownClasses(comparison, references, fitted, calibration)
 

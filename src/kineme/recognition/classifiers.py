@@ -425,12 +425,19 @@ CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
     "convolutions": lambda comparison, references: fit_convolutions(comparison, references)[0],
 }
 
-#: What "auto" stands for. Of gestures in space by other people, two to eight demonstrations of each class, and of bent
-#: handwriting, twelve of each, it is ahead of the nearest by up to 0.01, and of the SVM
-#: (``python -m bench --only defaults``).
-AUTO = "nearest-each"
+#: What "auto" stands for where nothing joins the kernels. Of gestures in space by other people, two to eight
+#: demonstrations of each class, and of bent handwriting, twelve of each, it is ahead of the nearest by up to 0.01, and
+#: of the SVM (``python -m bench --only defaults``).
+KERNELS = "nearest-each"
 
 
-def fit_classifier(name: str, comparison: Comparison, references: References) -> Classifier:
-    """Return the classifier of that name, or the one that "auto" stands for."""
-    return CLASSIFIERS[AUTO if name == "auto" else name](comparison, references)
+def fit_classifier(
+    name: str, comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None
+) -> Classifier:
+    """Return the classifier of that name, or the one that "auto" stands for; `groups` as in `Recognizer.fit`."""
+    return fit_best(comparison, references, groups) if name == "auto" else CLASSIFIERS[name](comparison, references)
+
+
+def by_kernels(name: str) -> str:
+    """Return the name of a classifier, of "auto" that of its kernels alone."""
+    return KERNELS if name == "auto" else name

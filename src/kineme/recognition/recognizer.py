@@ -16,7 +16,7 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, is_one, known_classes
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_best
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.reporting.table import to_html
 from kineme.reporting.text import in_markup
@@ -184,10 +184,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         order = np.argsort(labels, kind="stable")
         numbers = None if groups is None else check_groups(groups, len(demos))[order]
         comparison, references = fit_comparison(specification, demos, labels, self.weights)
-        if self.classifier == "auto":
-            classifier = fit_best(comparison, references, numbers)
-        else:
-            classifier = CLASSIFIERS[self.classifier](comparison, references)
+        classifier = fit_classifier(self.classifier, comparison, references, numbers)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
         self._groups: NDArray[np.intp] | None = numbers

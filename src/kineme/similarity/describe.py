@@ -68,10 +68,10 @@ def describe(movements: Described | MovementsLike, like: Compares | None = None)
 def describe_as(demos: Demonstrations, like: Compares, procrustes: Procrustes) -> Described:
     """Describe movements for a distance that is known, with their `recorded_values` where these count."""
     how = like.specification
-    return _with_values(prepare(feature_rows(demos, how), like, procrustes), demos, 0, len(demos), how)
+    return with_values(prepare(feature_rows(demos, how), like, procrustes), demos, 0, len(demos), how)
 
 
-def _with_values(
+def with_values(
     described: Described, demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
 ) -> Described:
     """Add the values of movements start:stop where they count: of signals and sensors, which are not rotated."""
@@ -208,7 +208,7 @@ def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, 
     """Describe movements start:stop, all at once."""
     how = like.specification
     paths, rows = _tile_rows(demos, start, stop, how, _precision(how))
-    return Tile(start, stop, paths, _with_values(prepare(rows, like, procrustes), demos, start, stop, how))
+    return Tile(start, stop, paths, with_values(prepare(rows, like, procrustes), demos, start, stop, how))
 
 
 def describe_paths(paths: Array, details: Array, like: Compares, procrustes: Procrustes) -> Described:
