@@ -29,7 +29,7 @@ from kineme.recognition.classifiers import BY_CONVOLUTIONS
 from kineme.recognition.conformal import EXPONENT, LEAST, class_probabilities, distances
 from kineme.similarity.comparison import References, fit_to_references
 from kineme.similarity.describe import Described, describe
-from kineme.similarity.scores import nearest, score
+from kineme.similarity.scores import score
 from kineme.similarity.specification import ComparisonSpecification
 from kineme_experiments.evaluation.conditions import TOGETHER
 
@@ -144,7 +144,7 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
     logs, novelty, rejected = [], [], []
     for asked in (split.known, split.unknown):
         compared = recognizer.comparison, recognizer.references, one.described.take(asked)
-        found, similar = score(*compared, nearest, classifier.scores)
+        found, similar = score(*compared, classifier.nearest_logs, classifier.scores)
         p = calibration.known_p_values(found, ERROR_RATE)
         logs.append(similar)
         novelty.append(calibration.scores(found).min(axis=1))

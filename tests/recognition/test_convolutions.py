@@ -22,6 +22,7 @@ from kineme.recognition.convolutions import (
     series_of,
     transform,
 )
+from kineme.similarity.scores import Compared
 from kineme.similarity.specification import ROW_REPRESENTATIONS
 from kineme.studio.snapshot import snapshot_of_recognizer
 
@@ -242,6 +243,55 @@ def test_the_exponent_of_profiles_is_fitted_to_scores_with_profiles(groups):
     np.testing.assert_allclose([given.probabilities[label] for label in once.classes_], expected[1], rtol=1e-5)
 
 
+@pytest.mark.parametrize("n_dims", [1, 4])
+def test_signals_are_known_by_profiles_and_values_too(n_dims):
+    """All three kernels of each pair are averaged: of a movement and a demonstration, and of two demonstrations."""
+    shown, asked = (columns_of(draw_trembles(4, seed=seed), n_dims) for seed in (3, 4))
+    recognizer = kineme.Recognizer().fit(shown)
+    classifier = recognizer.classifier_.nearest
+    v = classifier.values
+
+    def averaged(demos):
+        described = recognizer.describe(demos)
+        features = transform(series_of(described), classifier.kernels) - classifier.center
+        profiles = features / np.linalg.norm(features, axis=1, keepdims=True)
+        rows = (described.values - v.center) / v.spread * np.append(np.full(8, 8**-0.5), 1.0)
+        squares = ((rows.reshape(len(demos), 1, -1) - v.rows) ** 2).sum(axis=2)
+        shares = 0.75 * np.exp(recognizer.log_similarity(demos))
+        shares += 0.25 * np.exp((profiles @ classifier.profiles.T - 1) / classifier.width**2)
+        return distances(np.log((1 - v.share) * shares + v.share * np.exp(-0.5 * squares / v.width**2)))
+
+    among = averaged(shown)
+    np.fill_diagonal(among, np.inf)
+    own = np.stack([among[4 * c : 4 * c + 4, 4 * c : 4 * c + 4].min(axis=1) for c in range(3)])
+    scales = (own.sum(axis=1) + 4 * own.mean()) / 8
+    calibration = recognizer.calibration()
+    np.testing.assert_allclose(calibration.scales, scales, rtol=1e-4)
+    novelty = (averaged(asked).reshape(12, 3, 4).min(axis=2) / scales).min(axis=1)
+    np.testing.assert_allclose(recognizer.novelty(asked), novelty, rtol=1e-4)
+    answers = recognizer.recognize(asked)
+    known = calibration.known_p_values(recognizer._scores(asked, recognizer.classifier_.nearest_logs), 0.05)
+    np.testing.assert_allclose([answer.p_known for answer in answers], known, atol=1e-6)
+    assert (recognizer.predict_known(asked) == [answer.label for answer in answers]).all()
+    compared, again = (
+        Compared(recognizer.comparison_, recognizer.references_, recognizer.describe(asked)) for _ in range(2)
+    )
+    without = replace(classifier, values=None)
+    assert not np.allclose(classifier.nearest_logs(compared), without.nearest_logs(compared))
+    np.testing.assert_array_equal(without.nearest_logs(compared), without.nearest_logs(again))
+
+
+def test_what_is_spotted_is_known_by_kernels_alone():
+    """As of windows there are neither profiles nor values."""
+    shown = columns_of(draw_trembles(4, seed=3), 1)
+    by_all, by_kernels = (kineme.Recognizer(classifier=name).fit(shown) for name in ("auto", "nearest-each"))
+    rest = np.zeros((40, 1))
+    recording = np.vstack([part for demo in shown[::3] for part in (rest + demo.positions[0], demo.positions)])
+    assert by_all.spot(recording) == by_kernels.spot(recording)
+    assert by_all.calibration().scales.tolist() != by_kernels.calibration().scales.tolist()
+    assert by_all.calibration_of_kernels().scales.tolist() == by_kernels.calibration().scales.tolist()
+
+
 def columns_of(demos, n_dims):
     """The trembles in so many columns."""
     chosen = np.arange(n_dims) % 2
@@ -381,7 +431,7 @@ def test_with_profiles_one_class_is_named_everywhere():
     assert explained.by_convolutions
 
 
-@pytest.mark.parametrize(("each", "n_dims"), [(1, 4), (3, 2)])
+@pytest.mark.parametrize(("each", "n_dims"), [(1, 4), (3, 2), (3, 4)])
 def test_the_page_answers_by_the_kernels_alone_and_says_so(each, n_dims):
     shown = columns_of(draw_trembles(each, seed=4), n_dims)
     recognizer = kineme.Recognizer().fit(shown)

@@ -22,13 +22,14 @@ from kineme.recognition.two_stage_search import calibrate_sample
 from kineme.reporting.atomic import write_atomically
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References, StoredReferences, fit_to_references
+from kineme.similarity.scores import Classifier
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.validation import Array
 
 FILE = "calibration.cache"  # of a large library, by a sample
 FILE_OF_ALL = "calibration_of_all.cache"  # of a smaller one, whose members are all compared
 
-_FORMAT = "4"
+_FORMAT = "5"
 _FEW = 500  # members of which a calibration takes 0.1 s: computed every time
 _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
@@ -54,12 +55,13 @@ def calibrated_once(
     similarity: AveragedSimilarity,
     references: References,
     groups: NDArray[np.intp] | None,
+    classifier: Classifier,
 ) -> Calibration:
     """Return `conformal.calibrate` of the members, from a cache of its own; of few, it is computed every time."""
     if len(members.ids) < _FEW:
-        return calibrate(similarity, references, groups)
+        return calibrate(similarity, references, groups, classifier)
     key = _key(store, members, _digests(store, members))
-    return _cached(store, FILE_OF_ALL, key, members, lambda: calibrate(similarity, references, groups))
+    return _cached(store, FILE_OF_ALL, key, members, lambda: calibrate(similarity, references, groups, classifier))
 
 
 def _cached(store: Store, name: str, key: str, members: Members, make: Callable[[], Calibration]) -> Calibration:

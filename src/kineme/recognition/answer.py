@@ -23,7 +23,7 @@ from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison
 from kineme.similarity.describe import Described, Tile, even_paths, fit_maps, recorded_paths
-from kineme.similarity.scores import Classifier, Compared, for_compared, nearest, score
+from kineme.similarity.scores import Classifier, Compared, for_compared, score
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import POSITIONS, ComparisonSpecification
 from kineme.validation import Array
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: What calibrates references, as `calibrate` does.
-Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None], Calibration]
+Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None, Classifier], Calibration]
 
 Certainty = Literal["sure", "probably", "looks like", "new"]
 
@@ -310,13 +310,13 @@ def verdicts_of(
     compared: Compared, classifier: Classifier, calibration: Calibration, error_rate: float
 ) -> list[Verdict]:
     """Tell what each movement is, from how it compares."""
-    scores = classifier.scores(compared)
-    p = calibration.p_values(compared.nearest, error_rate)
+    scores, similar = classifier.scores(compared), classifier.nearest_logs(compared)
+    p = calibration.p_values(similar, error_rate)
     calibrated = bool(calibration.calibrated(error_rate).all())
     references = compared.references
-    p_known = calibration.known_p_values(compared.nearest, error_rate)
+    p_known = calibration.known_p_values(similar, error_rate)
     labels = known_labels(classifier, references.classes, scores, p, p_known, error_rate)
-    rules = calibration.rules(compared.nearest, error_rate)
+    rules = calibration.rules(similar, error_rate)
     classes = references.classes.tolist()
     ranks = np.argsort(-scores, axis=1, kind="stable")
     index_of = {label: c for c, label in enumerate(classes)}
@@ -330,8 +330,8 @@ def verdicts_of(
     if isinstance(classifier, BY_CONVOLUTIONS):
         probabilities = classifier.probabilities(scores)
     else:
-        similar = scores if isinstance(classifier, NearestEach) else compared.nearest
-        probabilities = class_probabilities(similar, calibration.exponent)
+        distances = scores if isinstance(classifier, NearestEach) else similar
+        probabilities = class_probabilities(distances, calibration.exponent)
     examples = []  # the nearest of the class that is shown, and of the best-ranked other one
     for i, best in enumerate(like):
         others = [c for c in ranks[i, :2].tolist() if c != shown[i]][:1]
@@ -418,6 +418,10 @@ class FittedRecognizer(Protocol):
         """Return the calibration of the p-values."""
         ...
 
+    def calibration_of_kernels(self) -> Calibration:
+        """Return the calibration of p-values by the kernels alone."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class KnownClasses:
@@ -447,7 +451,8 @@ class KnownClasses:
     def labels(self, movements: Demonstrations | Described, error_rate: float) -> tuple[NDArray[Any], Array]:
         """Return labels (n,) as from `known_labels`, and p-values (n, C) of movements in the coordinates learned."""
         check_error_rate(error_rate)
-        similarities, scores = score(self.comparison, self.references, movements, nearest, self.classifier.scores)
+        by = self.classifier.nearest_logs, self.classifier.scores
+        similarities, scores = score(self.comparison, self.references, movements, *by)
         p_values = self.calibration.p_values(similarities, error_rate)
         p_known = self.calibration.known_p_values(similarities, error_rate)
         classes = self.references.classes
@@ -481,7 +486,7 @@ def fit_known_classes(
     """
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
         fitted = fit_classifier(classifier, comparison, references, groups)
-        calibration = calibrated(comparison.similarity, references, groups)
+        calibration = calibrated(comparison.similarity, references, groups, fitted)
     return KnownClasses(comparison, references, fitted, calibration)
 
 

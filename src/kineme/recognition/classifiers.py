@@ -50,7 +50,7 @@ VALUED = (0.15, 0.05, 0.3, 0.5)
 _EXPONENT = 8.0
 _LEAST = 1e-9  # of a probability by convolutions
 _NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
-_CONSTANT = 1e-9  # spread of a column, for its size, that is rounding
+_CONSTANT, _NOTHING = 1e-9, 1e-13  # spread of a column, for its size and for that of the largest, that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
@@ -117,30 +117,51 @@ class NearestProfiled(NearestEach):
 
     def scores(self, compared: Compared) -> Array:
         """Return the logarithm of the average of all, (n, C)."""
-        features, values = transform(series_of(compared.described), self.kernels), compared.described.values
-        rows = (
-            None if self.values is None or values is None else _standard(values, self.values.center, self.values.spread)
-        )
-        return self.with_others(compared.nearest_each, _profiles(features, self.center), rows, compared.references)
+        others = [_nearest(logs, compared.references) for logs in self._others(compared)]
+        return self._averaged(compared.nearest_each, others)
 
-    def with_others(
-        self,
-        by_kernels: Array,
-        profiles: Array,
-        values: Array | None,
-        references: References,
-        hidden: NDArray[np.bool_] | None = None,
-    ) -> Array:
-        """Return scores (n, C), of `by_kernels`, profiles (n, f) and rows of values (n, 9 d), if there are any.
+    def nearest_logs(self, compared: Compared) -> Array:
+        """Return log similarity (n, C), by all kernels, to the nearest reference of each class."""
+        return _nearest(self._averaged(compared.log_average, self._others(compared)), compared.references)
 
-        Pairs with references `hidden` (n, m) do not count.
-        """
-        squares = 2.0 - 2.0 * (profiles @ self.profiles.T)
-        scores = _added(by_kernels, PROFILED, _log_nearest(squares, self.width, references, hidden))
-        if values is None or self.values is None:
-            return scores
-        squares = _squares(values, self.values.rows)
-        return _added(scores, self.values.share, _log_nearest(squares, self.values.width, references, hidden))
+    def logs_among(self, logs: Array, chosen: NDArray[np.intp]) -> Array:
+        """Return log similarities (k, m) of chosen references to all, by all kernels."""
+        return self._averaged(logs, self._of_references(chosen))
+
+    def scores_without(self, left_out: LeftOut, references: References) -> Array:
+        """Return scores (k, C) of references that are left out."""
+        hidden = left_out.hidden
+        others = [
+            _nearest(np.where(hidden, -np.inf, logs), references) for logs in self._of_references(left_out.chosen)
+        ]
+        return self._averaged(left_out.scores, others)
+
+    def _others(self, compared: Compared) -> list[Array]:
+        """Return logarithms (n, m) of the kernels on profiles and, where there are some, on values; computed once."""
+        by, others = vars(compared).get("others", (None, []))
+        if by is not self:
+            own, values = self.values, compared.described.values
+            profiles = _profiles(transform(series_of(compared.described), self.kernels), self.center)
+            rows = None if own is None or values is None else _standard(values, own.center, own.spread)
+            others = self._logs(profiles, rows)
+            vars(compared)["others"] = self, others
+        return others
+
+    def _of_references(self, chosen: NDArray[np.intp]) -> list[Array]:
+        """Return the same of chosen references, (k, m)."""
+        return self._logs(self.profiles[chosen], None if self.values is None else self.values.rows[chosen])
+
+    def _logs(self, profiles: Array, rows: Array | None) -> list[Array]:
+        logs = [_log_kernel(2.0 - 2.0 * (profiles @ self.profiles.T), self.width)]
+        if rows is not None and self.values is not None:
+            logs.append(_log_kernel(_squares(rows, self.values.rows), self.values.width))
+        return logs
+
+    def _averaged(self, by_kernels: Array, others: list[Array]) -> Array:
+        """Return the logarithm of the average, with a share of profiles, and one of values."""
+        for logs, share in zip(others, (PROFILED, self.values.share if self.values else 0.0), strict=False):
+            by_kernels = np.logaddexp(np.log(1.0 - share) + by_kernels, np.log(share) + logs)
+        return by_kernels
 
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
@@ -151,23 +172,20 @@ class NearestProfiled(NearestEach):
         return class_probabilities(scores, self.exponent)
 
 
-def _added(scores: Array, share: float, others: Array) -> Array:
-    """Return the logarithm of the average, with a share of the others."""
-    return np.logaddexp(np.log(1.0 - share) + scores, np.log(share) + others)
-
-
 def _standard(values: Array, center: Array, spread: Array) -> Array:
     """Return rows (n, 9 d) of values (n, d, 9), whose squared distances are means over the time, and of deviations."""
     weights = np.append(np.full(N_MEANS, N_MEANS**-0.5), 1.0)
     return np.asarray(((values - center) / spread * weights).reshape(len(values), -1))
 
 
-def _log_nearest(squares: Array, width: float, references: References, hidden: NDArray[np.bool_] | None) -> Array:
-    """Return the logarithm of a Gaussian of squared distances (n, m) to the nearest reference of each class, (n, C)."""
-    if hidden is not None:
-        squares = np.where(hidden, np.inf, squares)
-    nearest = np.minimum.reduceat(squares, references.first, axis=1)
-    return np.asarray(-0.5 * np.maximum(nearest, 0.0) / width**2)
+def _log_kernel(squares: Array, width: float) -> Array:
+    """Return the logarithm of a Gaussian of squared distances."""
+    return np.asarray(-0.5 * np.maximum(squares, 0.0) / width**2)
+
+
+def _nearest(logs: Array, references: References) -> Array:
+    """Return the largest (n, C) of log similarities (n, m) to the references of each class."""
+    return np.asarray(np.maximum.reduceat(logs, references.first, axis=1))
 
 
 def _squares(rows: Array, others: Array) -> Array:
@@ -201,6 +219,14 @@ class LogarithmicPool(Classifier):
             pooled = self.share * np.log(np.maximum(by_convolutions, _LEAST))
             scores[unsure] = (1.0 - self.share) * scores[unsure] + pooled
         return scores
+
+    def nearest_logs(self, compared: Compared) -> Array:
+        """Return those of the kernels."""
+        return self.nearest.nearest_logs(compared)
+
+    def logs_among(self, logs: Array, chosen: NDArray[np.intp]) -> Array:
+        """Return those of the kernels."""
+        return self.nearest.logs_among(logs, chosen)
 
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C)."""
@@ -334,7 +360,7 @@ def _values(references: References) -> Values | None:
         return None
     spread = np.sqrt((values[:, :, -1] ** 2).mean(axis=0) + values[:, :, :-1].mean(axis=2).var(axis=0))
     size = np.abs(values).max(axis=(0, 2))
-    spread[spread <= _CONSTANT * size] = np.inf
+    spread[spread <= np.maximum(_CONSTANT * size, _NOTHING * size.max())] = np.inf
     center, spread = values.mean(axis=0), spread[:, None]
     rows = _standard(values, center, spread)
     width = _width(_squares(rows, rows), references)
@@ -380,10 +406,9 @@ def _fitted_exponent(nearest: NearestEach, references: References, left_out: Lef
 
     See `fit_exponent`.
     """
-    chosen, scores, hidden, owners, n_others = left_out
+    _, scores, _, owners, n_others = left_out
     if isinstance(nearest, NearestProfiled):
-        values = None if nearest.values is None else nearest.values.rows[chosen]
-        scores = nearest.with_others(scores, nearest.profiles[chosen], values, references, hidden)
+        scores = nearest.scores_without(left_out, references)
     away = distances(scores)
     # As `calibrate` does: with all demonstrations of the class, the nearest would be somewhat nearer.
     away[np.arange(len(owners)), owners] *= (np.maximum(n_others, 1) / references.counts[owners]) ** (1 / DIMENSIONS)
@@ -411,6 +436,11 @@ def _left_out(
     owners = np.searchsorted(references.first, chosen, side="right") - 1
     n_others = np.add.reduceat(~hidden, references.first, axis=1)[np.arange(len(chosen)), owners]
     return LeftOut(chosen, scores, hidden, owners, n_others)
+
+
+def has_profiles(classifier: Classifier) -> bool:
+    """Tell whether profiles and values tell, beside the kernels, if a movement is known."""
+    return isinstance(getattr(classifier, "nearest", classifier), NearestProfiled)
 
 
 #: Those in which random convolutions rank the classes, alone or beside the kernels; they tell probabilities, too.

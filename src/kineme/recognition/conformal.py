@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
+from kineme.similarity.scores import Classifier
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import softmax
 from kineme.validation import Array, check_number
@@ -266,19 +267,24 @@ def _shares(calibrating: Array, scores: Array) -> Array:
 
 
 def calibrate(
-    similarity: AveragedSimilarity, references: References, groups: NDArray[np.intp] | None = None
+    similarity: AveragedSimilarity,
+    references: References,
+    groups: NDArray[np.intp] | None = None,
+    classifier: Classifier | None = None,
 ) -> Calibration:
-    """Return the score references against the others, at most a hundred of each class.
+    """Score references against the others, at most a hundred of each class.
 
     With `groups`, the number of each reference's group, none is compared with another of its group. Where all are of
-    one group nothing could be compared; they then count as movements without groups.
+    one group nothing could be compared; they then count as movements without groups. By the similarity alone, or as a
+    `classifier` of the references tells whether a movement is known, see `Classifier.logs_among`.
     """
     counts = references.counts
     groups = comparable_groups(groups)
     blocks, others, impostors = [], [], []
     for own_class, count in zip(references.slices(), counts, strict=True):
         chosen = own_class.start + evenly_spaced(count, _CALIBRATED)
-        away = distances(similarity.log_average(references.described.take(chosen), references.described))
+        logs = similarity.log_average(references.described.take(chosen), references.described)
+        away = distances(logs if classifier is None else classifier.logs_among(logs, chosen))
         away[np.arange(len(chosen)), chosen] = np.inf
         of_others = away.copy()
         of_others[:, own_class] = np.inf

@@ -16,14 +16,14 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, is_one, known_classes
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_classifier
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_classifier, has_profiles
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.reporting.table import to_html
 from kineme.reporting.text import in_markup
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
 from kineme.similarity.describe import Described, Tile
-from kineme.similarity.scores import Compared, Score, for_compared, nearest, score
+from kineme.similarity.scores import Compared, Score, for_compared, score
 from kineme.similarity.specification import (
     ComparisonSpecification,
     Normalization,
@@ -74,7 +74,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "convolutions" of the path. "auto" is "nearest-each", of signals and of more than three columns that are no
         points with profiles of random convolutions and recorded values beside it, see `NearestProfiled`; from two
         demonstrations of each class on all are pooled with "convolutions", see `LogarithmicPool`, unless the kernels
-        recognize practically all that are left out. Whether a movement is known is told by the kernels alone: see
+        recognize practically all that are left out. Whether a movement is known is told without this classifier: see
         `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
@@ -188,7 +188,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
         self._groups: NDArray[np.intp] | None = numbers
-        self._calibration: Calibration | None = None  # these two are made when first asked for
+        self._calibration: Calibration | None = None  # these three are made when first asked for
+        self._of_kernels: Calibration | None = None
         self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self
 
@@ -324,7 +325,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         classes the rate holds, see `Calibration`.
         """
         check_error_rate(error_rate)
-        return self.calibration().p_values(self._scores(X, nearest), error_rate)
+        return self.calibration().p_values(self._scores(X, self.classifier_.nearest_logs), error_rate)
 
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Return labels as from `predict`, by kernels among the classes whose p-value is above `error_rate`.
@@ -336,15 +337,24 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def novelty(self, X: MovementsLike) -> Array:
         """Return the smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
-        return np.asarray(self.calibration().scores(self._scores(X, nearest)).min(axis=1))
+        return np.asarray(self.calibration().scores(self._scores(X, self.classifier_.nearest_logs)).min(axis=1))
 
     def calibration(self) -> Calibration:
         """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
-        calibration = self._calibration
-        if calibration is None:
-            self._calibration = calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
-        return calibration
+        if self._calibration is None:
+            groups = vars(self).get("_groups")
+            self._calibration = calibrate(comparison.similarity, references, groups, self.classifier_)
+        return self._calibration
+
+    def calibration_of_kernels(self) -> Calibration:
+        """Return the calibration of p-values by the kernels alone: of what is spotted, and of a page."""
+        comparison, references = self._fitted
+        if not has_profiles(self.classifier_):
+            return self.calibration()
+        if self._of_kernels is None:
+            self._of_kernels = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+        return self._of_kernels
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
@@ -377,7 +387,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         from kineme.recognition.compared_windows import Templates
         from kineme.recognition.spotting import spot
 
-        return spot(Templates(*self._fitted, self.calibration()), recording, error_rate, max_pieces)
+        return spot(Templates(*self._fitted, self.calibration_of_kernels()), recording, error_rate, max_pieces)
 
     def predict_partial(self, X: MovementsLike, early: Early | None = None) -> NDArray[Any]:
         """Return the most likely class of each movement of which only the beginning is given, shape (n,).

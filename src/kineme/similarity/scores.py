@@ -88,7 +88,7 @@ class Compared:
 
 
 class Classifier(Protocol):
-    """A fitted classifier: scores of each class."""
+    """A fitted classifier: scores of each class, and by which similarity a movement is known."""
 
     def scores(self, compared: Compared) -> Array:
         """Return a score per class, shape (n, C): larger is more like it."""
@@ -97,6 +97,14 @@ class Classifier(Protocol):
     def best(self, compared: Compared) -> NDArray[np.intp]:
         """Return the index (n,) of the class with the largest score."""
         return self.scores(compared).argmax(axis=1)
+
+    def nearest_logs(self, compared: Compared) -> Array:
+        """Return log similarity (n, C) to the nearest reference of each class, by which a movement is known."""
+        return compared.nearest
+
+    def logs_among(self, logs: Array, chosen: Indices) -> Array:
+        """Return such similarities of chosen references to all, (k, m); `logs` are those of the averaged kernel."""
+        return logs
 
 
 Score = Callable[[Compared], Array]

@@ -351,7 +351,7 @@ def snapshot_of_recognizer(
             UserWarning,
             2,
         )
-        classes = replace(classes, classifier=NearestEach())
+        classes = replace(classes, classifier=NearestEach(), calibration=recognizer.calibration_of_kernels())
     demos = classes.references.all_movements()
     medoids = fit_prototype(classes.comparison, classes.references).medoids
     return _snapshot(classes, (dmp or DMP()).learn(demos[medoids]), early)
