@@ -59,6 +59,7 @@ from kineme.similarity.describe import describe_rows, feature_rows, maps_onto, p
 from kineme.similarity.describe import moved as laid_onto
 from kineme.similarity.similarity import compare
 from kineme.similarity.specification import ROW_REPRESENTATIONS, SCALES, ComparisonSpecification, Normalization
+from kineme.validation import Array
 
 
 @dataclass(frozen=True)
@@ -223,17 +224,31 @@ def arc(demos: Demonstrations) -> list[dict[str, Any]]:
 
 
 @cache
-def recognizer() -> Recognizer:
+def recognizer(n_columns: int = 2) -> Recognizer:
     """From three demonstrations of each of five kinds, whatever is drawn later."""
     drawn = [(40 + 3 * i, 0, "jitter", 0, 100 + i // 3) for i in range(15)]
     noise = np.random.default_rng(7)
     shown = reaches(drawn)
     arrays = [one.positions + 0.03 * noise.normal(size=one.positions.shape).cumsum(axis=0) / 6 for one in shown]
-    return Recognizer().fit(arrays, [f"{i // 3}" for i in range(15)])
+    return Recognizer().fit([in_columns(array, n_columns) for array in arrays], [f"{i // 3}" for i in range(15)])
 
 
-def recognized(demos: Demonstrations) -> list[dict[str, Any]]:
-    known = recognizer()
+def in_columns(positions: Array, n: int) -> Array:
+    """So many columns of the plane: its own, their sum and their difference."""
+    x, y = positions.T
+    return np.column_stack([x, y, x + y, x - y])[:, :n]
+
+
+def recognized_columns(n: int) -> Batched:
+    def numbers(demos: Demonstrations) -> list[dict[str, Any]]:
+        arrays = [in_columns(one.positions, n) for one in demos]
+        return recognized(Demonstrations.from_arrays(arrays, times=[one.times for one in demos]), n)
+
+    return Batched(f"Recognizer of {n} columns", numbers, 2e-5)
+
+
+def recognized(demos: Demonstrations, n_columns: int = 2) -> list[dict[str, Any]]:
+    known = recognizer(n_columns)
     return each(
         len(demos),
         similarity=np.sqrt(-2 * known.log_similarity(demos)),
@@ -646,6 +661,8 @@ TABLE = [
     Batched("recorded_values", lambda demos: each(len(demos), values=recorded_values(demos, 0, len(demos))), 1e-9),
     Batched("maps_onto", aligned, 1e-7),
     Batched("Recognizer", recognized, 2e-5),
+    recognized_columns(1),
+    recognized_columns(4),
     Batched("Recognizer.recognize", answers, 2e-5),
     Batched("Recognizer.predict_partial", partly_seen, 0.0, alone=6),
     *(gram_row(name, kernel, dtype) for name, kernel in kernels() for dtype in ("float64", "float32")),

@@ -309,7 +309,7 @@ class ActionLibrary:
         The label is then that of the single nearest movement, as with ``classifier="nearest"``, whichever the library
         was created with. It is the one of comparing all if no representation compares pairs; else nearly always, as the
         bounds say nothing of those, see `kineme.recognition.two_stage_search.TwoStageSearch`. The first answer after a
-        change takes longer; what it prepares is cached beside the database unless `read_only`.
+        change takes longer; distances of many movements are cached beside the database unless `read_only`.
 
         Parameters
         ----------
@@ -487,7 +487,10 @@ class ActionLibrary:
         changes.release(self.store, ids)
 
     def join(self, error_rate: float = 0.05) -> dict[str, int]:
-        """Add movements without a symbol to those that they are recognized as; return name -> number of new members."""
+        """Add movements without a symbol to those that they are recognized as; return name -> number of new members.
+
+        By the kernels alone, and for people who showed some: more than by `recognize` are unknown, and are left.
+        """
         from kineme.library.proposals import assign_recognized, recognized
 
         return assign_recognized(self.store, recognized(self.store, error_rate))

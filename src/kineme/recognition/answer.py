@@ -278,8 +278,8 @@ def known_labels(
 ) -> NDArray[np.object_]:
     """Choose the best class of each movement by `scores` (n, C); None, unknown, where `p_known` (n,) is small.
 
-    Kernels choose among the classes whose p-value is above the error rate, if there are any. P-values rest on the
-    kernels' distances, so random convolutions, which tell classes apart where these do not, choose among all.
+    Kernels choose among the classes whose p-value is above the error rate, if there are any. P-values rest on distances
+    to the nearest reference, so random convolutions, which tell classes apart where these do not, choose among all.
     """
     possible = p_values > error_rate
     possible |= ~possible.any(axis=1, keepdims=True) | isinstance(classifier, BY_CONVOLUTIONS)

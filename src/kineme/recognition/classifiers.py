@@ -50,7 +50,7 @@ VALUED = (0.15, 0.05, 0.3, 0.5)
 _EXPONENT = 8.0
 _LEAST = 1e-9  # of a probability by convolutions
 _NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
-_CONSTANT, _NOTHING = 1e-9, 1e-13  # spread of a column, for its size and for that of the largest, that is rounding
+_CONSTANT, _NOTHING = 1e-9, 1e-14  # spread of a column, for its size and for the largest spread, that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
@@ -221,11 +221,11 @@ class LogarithmicPool(Classifier):
         return scores
 
     def nearest_logs(self, compared: Compared) -> Array:
-        """Return those of the kernels."""
+        """Return those of what is pooled with the convolutions."""
         return self.nearest.nearest_logs(compared)
 
     def logs_among(self, logs: Array, chosen: NDArray[np.intp]) -> Array:
-        """Return those of the kernels."""
+        """Return those of what is pooled with the convolutions."""
         return self.nearest.logs_among(logs, chosen)
 
     def probabilities(self, scores: Array) -> Array:
@@ -360,7 +360,7 @@ def _values(references: References) -> Values | None:
         return None
     spread = np.sqrt((values[:, :, -1] ** 2).mean(axis=0) + values[:, :, :-1].mean(axis=2).var(axis=0))
     size = np.abs(values).max(axis=(0, 2))
-    spread[spread <= np.maximum(_CONSTANT * size, _NOTHING * size.max())] = np.inf
+    spread[spread <= np.maximum(_CONSTANT * size, _NOTHING * spread.max())] = np.inf
     center, spread = values.mean(axis=0), spread[:, None]
     rows = _standard(values, center, spread)
     width = _width(_squares(rows, rows), references)
@@ -436,11 +436,6 @@ def _left_out(
     owners = np.searchsorted(references.first, chosen, side="right") - 1
     n_others = np.add.reduceat(~hidden, references.first, axis=1)[np.arange(len(chosen)), owners]
     return LeftOut(chosen, scores, hidden, owners, n_others)
-
-
-def has_profiles(classifier: Classifier) -> bool:
-    """Tell whether profiles and values tell, beside the kernels, if a movement is known."""
-    return isinstance(getattr(classifier, "nearest", classifier), NearestProfiled)
 
 
 #: Those in which random convolutions rank the classes, alone or beside the kernels; they tell probabilities, too.

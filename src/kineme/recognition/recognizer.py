@@ -16,7 +16,7 @@ from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, is_one, known_classes
-from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, SupportVectors, fit_classifier, has_profiles
+from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, NearestProfiled, SupportVectors, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate, check_groups, class_probabilities
 from kineme.reporting.table import to_html
 from kineme.reporting.text import in_markup
@@ -74,7 +74,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "convolutions" of the path. "auto" is "nearest-each", of signals and of more than three columns that are no
         points with profiles of random convolutions and recorded values beside it, see `NearestProfiled`; from two
         demonstrations of each class on all are pooled with "convolutions", see `LogarithmicPool`, unless the kernels
-        recognize practically all that are left out. Whether a movement is known is told without this classifier: see
+        recognize practically all that are left out. Whether a movement is known is told without what is pooled, see
         `kineme.recognition.answer.known_labels`.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions, where there is no
@@ -342,19 +342,21 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def calibration(self) -> Calibration:
         """Return the calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
-        if self._calibration is None:
-            groups = vars(self).get("_groups")
-            self._calibration = calibrate(comparison.similarity, references, groups, self.classifier_)
-        return self._calibration
+        calibration, groups = self._calibration, vars(self).get("_groups")
+        if calibration is None:
+            calibration = calibrate(comparison.similarity, references, groups, self.classifier_)
+            self._calibration = calibration
+        return calibration
 
     def calibration_of_kernels(self) -> Calibration:
         """Return the calibration of p-values by the kernels alone: of what is spotted, and of a page."""
         comparison, references = self._fitted
-        if not has_profiles(self.classifier_):
+        if not isinstance(getattr(self.classifier_, "nearest", self.classifier_), NearestProfiled):
             return self.calibration()
-        if self._of_kernels is None:
-            self._of_kernels = calibrate(comparison.similarity, references, vars(self).get("_groups"))
-        return self._of_kernels
+        calibration: Calibration | None = vars(self).get("_of_kernels")
+        if calibration is None:
+            self._of_kernels = calibration = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+        return calibration
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
