@@ -19,7 +19,7 @@ from kineme.recognition.conformal import (
     fit_exponent,
     log_class_probabilities,
 )
-from kineme.recognition.convolutions import Convolutions, Kernels, fit_convolutions, fit_kernels, series_of, transform
+from kineme.recognition.convolutions import Convolutions, Kernels, convolve, fit_convolutions, series_of, transform
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import N_MEANS, Described
@@ -130,11 +130,8 @@ class NearestProfiled(NearestEach):
 
     def scores_without(self, left_out: LeftOut, references: References) -> Array:
         """Return scores (k, C) of references that are left out."""
-        hidden = left_out.hidden
-        others = [
-            _nearest(np.where(hidden, -np.inf, logs), references) for logs in self._of_references(left_out.chosen)
-        ]
-        return self._averaged(left_out.scores, others)
+        shown = [np.where(left_out.hidden, -np.inf, logs) for logs in self._of_references(left_out.chosen)]
+        return self._averaged(left_out.scores, [_nearest(logs, references) for logs in shown])
 
     def _others(self, compared: Compared) -> list[Array]:
         """Return logarithms (n, m) of the kernels on profiles and, where there are some, on values; computed once."""
@@ -324,14 +321,12 @@ class LeftOut(NamedTuple):
     n_others: NDArray[np.intp]  # (k,), how many others of their class they are compared with
 
 
-def fit_profiled(comparison: Comparison, references: References, left_out: LeftOut) -> NearestEach:
+def fit_profiled(references: References, left_out: LeftOut, convolved: tuple[Kernels, Array]) -> NearestEach:
     """Return the kernels with profiles and values of the references; widths are chosen as for representations.
 
     Without profiles where most have a copy in another class, which leaves a width of rounding, or there is one class.
     """
-    series = series_of(references.described)
-    kernels = fit_kernels(series)
-    features = transform(series, kernels)
+    kernels, features = convolved
     center = features.mean(axis=0)
     profiles = _profiles(features, center)
     width = _width(2.0 - 2.0 * (profiles @ profiles.T), references)
@@ -387,14 +382,15 @@ def fit_best(comparison: Comparison, references: References, groups: NDArray[np.
     logs = comparison.similarity.logs(references.described.take(chosen), references.described)
     groups = comparable_groups(groups)
     by_groups = _left_out(comparison, references, chosen, logs, groups)
-    nearest = fit_profiled(comparison, references, by_groups) if profiled else NearestEach()
+    convolved = convolve(references) if profiled else None
+    nearest = NearestEach() if convolved is None else fit_profiled(references, by_groups, convolved)
     if one_each:
         return nearest
     alone = by_groups if groups is None else _left_out(comparison, references, chosen, logs, None)
     by_kernels = float((alone.scores.argmax(axis=1) == alone.owners).mean())
     if by_kernels >= _ENOUGH and comparison.procrustes.n_points == 1:
         return nearest
-    convolutions, by_convolutions = fit_convolutions(comparison, references)
+    convolutions, by_convolutions = fit_convolutions(comparison, references, convolved)
     share = _SHARE_AHEAD if by_convolutions >= by_kernels + _AHEAD else _SHARE
     if isinstance(nearest, NearestProfiled):
         return LogarithmicPool(nearest, convolutions, share, nearest.exponent)

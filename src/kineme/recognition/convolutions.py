@@ -136,13 +136,21 @@ class Convolutions(Classifier):
         return softmax(self.sharpness * scores, axis=1)
 
 
-def fit_convolutions(comparison: Comparison, references: References) -> tuple[Convolutions, float]:
+def convolve(references: References) -> tuple[Kernels, Array]:
+    """Draw kernels for references; return them with the features of the references, (m, f)."""
+    series = series_of(references.described)
+    kernels = fit_kernels(series)
+    return kernels, transform(series, kernels)
+
+
+def fit_convolutions(
+    comparison: Comparison, references: References, convolved: tuple[Kernels, Array] | None = None
+) -> tuple[Convolutions, float]:
     """Fit the classifier; return it with the share of references that it recognizes when they are left out.
 
     The penalty is chosen by leaving out (generalized cross-validation), as `sklearn.linear_model.RidgeClassifierCV`
-    does it.
-
-    Raises `SpecificationError`: references of one class, or that are not compared in detail.
+    does it. `convolved` is what `convolve` gave, if it was called before. Raises `SpecificationError`: references of
+    one class, or that are not compared in detail.
     """
     from sklearn.linear_model import RidgeCV
 
@@ -153,9 +161,7 @@ def fit_convolutions(comparison: Comparison, references: References) -> tuple[Co
             f"{len(references.classes)} class(es) in {', '.join(each.name for each in comparison.representations)}; "
             "add movements of another class, or pass classifier='nearest-each'"
         )
-    series = series_of(references.described)
-    kernels = fit_kernels(series)
-    features = transform(series, kernels)
+    kernels, features = convolve(references) if convolved is None else convolved
     mean, scale = features.mean(axis=0), features.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     normalized = (features - mean) / scale
