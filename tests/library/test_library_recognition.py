@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Demonstrations, Recognizer
+from kineme import ActionLibrary, Demonstrations, Recognizer, Trajectory
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import calibration_cache
 from kineme.library import reduced_features_cache as features_cache
 from kineme.library.recognize import LibraryRecognizer
 from kineme.recognition import two_stage_search as sampled_calibration
+from kineme.recognition.answer import known_classes, open_set_labels
 from kineme.recognition.classifiers import LogarithmicPool, NearestProfiled
 from kineme.recognition.conformal import distances
 from kineme.similarity.comparison import StoredReferences
@@ -86,6 +87,23 @@ def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts
         ]
         assert [neighbor.name for neighbor in ours.nearest] == [neighbor.name for neighbor in theirs.nearest]
         np.testing.assert_allclose(ours.transform.matrix, theirs.transform.matrix, atol=1e-4)
+
+
+@pytest.mark.parametrize("d", [1, 2, 6])
+def test_movements_join_what_the_recognizer_says_of_those_who_showed_some(make, d):
+    demos, unlabeled = _kinds([4] * 6, d, spread=1.3), _kinds([4] * 8, d, spread=1.3)
+    library = make()
+    library.learn(demos)
+    library.learn([Trajectory(one.times, one.positions + 1.0) for one in unlabeled])
+    recognizer = Recognizer(representations=library.specification.representations).fit(demos)
+    moved = [Trajectory(one.times, one.positions + 1.0) for one in unlabeled]
+    labels = open_set_labels(known_classes(recognizer), recognizer.describe(moved), 0.05)[0]
+    names, counts = np.unique([label for label in labels if label is not None], return_counts=True)
+    assert isinstance(recognizer.classifier_, LogarithmicPool)
+    assert library.join() == dict(zip(names.tolist(), counts.tolist(), strict=True))
+    of_kernels = Recognizer(representations=library.specification.representations, classifier="nearest-each").fit(demos)
+    by_kernels = open_set_labels(known_classes(of_kernels), of_kernels.describe(moved), 0.05)[0]
+    assert by_kernels.tolist() != labels.tolist()
 
 
 @pytest.mark.soak("combinations")

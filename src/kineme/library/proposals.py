@@ -20,6 +20,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.schema import RETURNS
 from kineme.library.storage.store import Store, history
 from kineme.recognition.answer import KnownClasses, open_set_labels
+from kineme.recognition.classifiers import MOST
 from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
 from kineme.similarity.similarity import similarities
@@ -252,7 +253,10 @@ def some_members(store: Store) -> Members | None:
 def known_symbols(store: Store) -> KnownClasses | None:
     """Fit the recognition of symbols to at most 3000 of their movements; None without any."""
     members = some_members(store)
-    return None if members is None else known_members(store, members, in_memory=False)
+    if members is None:
+        return None
+    few = len(members.ids) <= MOST
+    return known_members(store, members, in_memory=few, kernels_alone=not few)
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
