@@ -94,9 +94,9 @@ def test_movements_join_what_the_recognizer_says_of_those_who_showed_some(make, 
     demos, unlabeled = _kinds([4] * 6, d, spread=1.3), _kinds([4] * 8, d, spread=1.3)
     library = make()
     library.learn(demos)
-    library.learn([Trajectory(one.times, one.positions + 1.0) for one in unlabeled])
-    recognizer = Recognizer(representations=library.specification.representations).fit(demos)
     moved = [Trajectory(one.times, one.positions + 1.0) for one in unlabeled]
+    library.learn(moved)
+    recognizer = Recognizer(representations=library.specification.representations).fit(demos)
     labels = open_set_labels(known_classes(recognizer), recognizer.describe(moved), 0.05)[0]
     names, counts = np.unique([label for label in labels if label is not None], return_counts=True)
     assert isinstance(recognizer.classifier_, LogarithmicPool)

@@ -489,7 +489,7 @@ class ActionLibrary:
     def join(self, error_rate: float = 0.05) -> dict[str, int]:
         """Add movements without a symbol to those that they are recognized as; return name -> number of new members.
 
-        As for people who showed some: more than by `recognize` are unknown, and are left.
+        It expects people who showed some. So it finds more of them unknown than `recognize` does, and leaves these.
         """
         from kineme.library.proposals import assign_recognized, recognized
 

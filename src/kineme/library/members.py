@@ -18,7 +18,7 @@ from kineme.library.storage.store import Store
 from kineme.movements.trajectories.labels import label_array
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, OnDemand, References
-from kineme.similarity.describe import Described, describe_rows, with_values
+from kineme.similarity.describe import Described, describe_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +75,7 @@ def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None
     """Describe movements as the library does, or as a comparison does, from their stored features."""
     chosen: Ids = np.asarray(ids, dtype=np.int64)
     if comparison is not None:
-        features = comparison.prepared(read.feature_blocks(store, chosen, comparison.specification.stored_rows))
-        if store.n_dims in (2, 3):
-            return features
-        return with_values(features, read.movements(store, chosen), 0, len(chosen), comparison.specification)
+        return comparison.prepared(read.feature_blocks(store, chosen, comparison.specification.stored_rows))
     how = store.specification.comparison.with_points(store.channels)
     return describe_rows(read.features(store, chosen), store.n_dims or 0, how)
 

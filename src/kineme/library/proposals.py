@@ -23,6 +23,7 @@ from kineme.recognition.answer import KnownClasses, open_set_labels
 from kineme.recognition.classifiers import MOST
 from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
+from kineme.similarity.describe import Described, with_values
 from kineme.similarity.similarity import similarities
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
@@ -103,7 +104,7 @@ def _clustered(
 ) -> Proposals:
     """Cluster movements: by how similar movements of known symbols are, where there are any."""
     if classes is not None:
-        members = described(store, ids, classes.comparison)
+        members = described_as_known(store, ids, classes)
         return assignment.assign_described(members, classes, min_members=min_members).proposals
     members, like = described(store, ids), store.specification.comparison
     how, people = method or DEFAULT_METHOD, groups_of(store, ids)
@@ -255,8 +256,15 @@ def known_symbols(store: Store) -> KnownClasses | None:
     members = some_members(store)
     if members is None:
         return None
-    few = len(members.ids) <= MOST
-    return known_members(store, members, in_memory=few, kernels_alone=not few)
+    return known_members(store, members, in_memory=len(members.ids) <= MOST, kernels_alone=False)
+
+
+def described_as_known(store: Store, ids: Ids, classes: KnownClasses) -> Described:
+    """Describe movements as those of known symbols are: they are read for recorded values, if these have some."""
+    features = described(store, ids, classes.comparison)
+    if classes.references.described.values is None:
+        return features
+    return with_values(features, read.movements(store, ids), 0, len(ids), classes.comparison.specification)
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
@@ -266,7 +274,7 @@ def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
     classes = known_symbols(store) if len(unlabeled) else None
     if classes is None:
         return Recognized()
-    names = open_set_labels(classes, described(store, unlabeled, classes.comparison), error_rate)[0].tolist()
+    names = open_set_labels(classes, described_as_known(store, unlabeled, classes), error_rate)[0].tolist()
     ids = {
         str(name): unlabeled[np.array([label == name for label in names])]
         for name in dict.fromkeys(name for name in names if name is not None)

@@ -133,8 +133,8 @@ def known_members(
     how = store.specification
     references = described_references(store, members.ids, members.labels)
     if in_memory:
-        demos = read.movements(store, members.ids)
-        described = with_values(references.described, demos, 0, len(demos), how.comparison)
+        demos, features = read.movements(store, members.ids), references.described
+        described = features if kernels_alone else with_values(features, demos, 0, len(demos), how.comparison)
         references = replace(references, demonstrations=demos, described=described)
     classifier = by_kernels(how.classifier) if kernels_alone else how.classifier
     fitted = fit_to_references(how.comparison, references, how.weights, store.channels)

@@ -330,8 +330,8 @@ def verdicts_of(
     if isinstance(classifier, BY_CONVOLUTIONS):
         probabilities = classifier.probabilities(scores)
     else:
-        distances = scores if isinstance(classifier, NearestEach) else similar
-        probabilities = class_probabilities(distances, calibration.exponent)
+        by_label = scores if isinstance(classifier, NearestEach) else similar
+        probabilities = class_probabilities(by_label, calibration.exponent)
     examples = []  # the nearest of the class that is shown, and of the best-ranked other one
     for i, best in enumerate(like):
         others = [c for c in ranks[i, :2].tolist() if c != shown[i]][:1]
@@ -480,10 +480,7 @@ def fit_known_classes(
     groups: NDArray[np.intp] | None = None,
     calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
-    """Fit a classifier to references of a fitted comparison; `groups` as in `kineme.Recognizer.fit`.
-
-    `calibrated` may keep calibrations.
-    """
+    """Fit a classifier to references; `groups` as in `kineme.Recognizer.fit`; `calibrated` may keep calibrations."""
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
         fitted = fit_classifier(classifier, comparison, references, groups)
         calibration = calibrated(comparison.similarity, references, groups, fitted)

@@ -274,9 +274,8 @@ def calibrate(
 ) -> Calibration:
     """Score references against the others, at most a hundred of each class.
 
-    With `groups`, the number of each reference's group, none is compared with another of its group. Where all are of
-    one group nothing could be compared; they then count as movements without groups. By the similarity alone, or as a
-    `classifier` of the references tells whether a movement is known, see `Classifier.logs_among`.
+    With `groups`, the number of each reference's group, none is compared with another of its group; references of one
+    group alone count as without. By the similarity, or as a `classifier` tells what is known, see `logs_among` there.
     """
     counts = references.counts
     groups = comparable_groups(groups)

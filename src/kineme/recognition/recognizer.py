@@ -344,8 +344,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         comparison, references = self._fitted
         calibration, groups = self._calibration, vars(self).get("_groups")
         if calibration is None:
-            calibration = calibrate(comparison.similarity, references, groups, self.classifier_)
-            self._calibration = calibration
+            self._calibration = calibration = calibrate(comparison.similarity, references, groups, self.classifier_)
         return calibration
 
     def calibration_of_kernels(self) -> Calibration:
