@@ -23,6 +23,7 @@ from kineme.recognition.compared_windows import (
     Candidates,
     ComparedWindows,
     Durations,
+    Surroundings,
     Templates,
     candidate_windows,
     compare_candidates,
@@ -35,11 +36,14 @@ from kineme.recognition.spotting import (
     Manner,
     Spotted,
     _completed,
+    _distances,
     _left_over,
     best_chain,
     closest_classes,
     durations_of,
     far,
+    most_nonconformity,
+    score_windows,
 )
 from kineme_experiments.evaluation.spotting import Counts, concatenate, count_spotted
 from movement_samples import draw_shapes
@@ -245,6 +249,19 @@ def test_windows_that_start_earlier_or_later_are_alike_too():
     assert closest_classes(compared, compared.scores, SAME, Manner(), spans, [0, 1, 2]).tolist() == [1, 1, 1]
 
 
+def test_a_short_window_costs_less_from_rest_to_rest():
+    compared = _compared([[0.7, 0.9]] * 3, [0.4, 0.4, 2.0])
+    around = Surroundings(np.zeros(3), np.array([0.0, 1e-3, 0.0]), np.zeros(3), np.zeros(3))
+    scored = score_windows(compared, SAME, around, Manner(tempo=0.0), 1.0)
+    others = 0.05 * compared.log_durations**2 + 0.03 * around.far_from_rest
+    expected = (1.0 - 0.7 - others) * np.exp(compared.log_durations) - [0.2 * 0.4, 0.165, 0.165]
+    np.testing.assert_allclose(scored.score, expected)
+    most = most_nonconformity(compared, SAME, around, Manner(tempo=0.0), 1.0)
+    for row in range(3):
+        at = replace(compared, scores=most)
+        assert score_windows(at, SAME, around, Manner(tempo=0.0), 1.0).score[row] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_durations_and_sizes_decide_between_classes_that_are_as_close():
     compared = _compared([[0.5, 0.5]], [2.0])
     typical = Expected(np.log([1.0, 2.0]), np.zeros(2), np.zeros(2))
@@ -297,6 +314,14 @@ def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(m
     np.testing.assert_allclose(complete, every.compared.scores[chosen], rtol=1e-5)
     for name in ("rows", "log_durations", "log_sizes", "slowness"):
         np.testing.assert_allclose(getattr(some.compared, name), getattr(every.compared, name))
+
+
+def test_windows_are_nearest_to_the_class_that_the_recognizer_answers():
+    known, windows = _windows([*KNOWN, *UNKNOWN])
+    rows = windows.rows[::10]
+    pieces = Demonstrations.of_movements(resampled(windows.motion, *windows.motion.times[rows].T))
+    away = _distances(known, windows.motion, rows)
+    assert (known.references.classes[away.argmin(axis=1)] == _recognizer().predict(pieces)).all()
 
 
 @pytest.mark.parametrize("shapes", [KNOWN, [*KNOWN, *UNKNOWN], UNKNOWN])
@@ -363,7 +388,7 @@ def test_the_best_chain_is_that_of_all_chains():
         n = int(rng.integers(2, 7))
         first, last = (side[:12] for side in rng.permutation(np.array(np.triu_indices(n, 1)).T).T)
         score = rng.normal(size=len(first))
-        chain = best_chain(first, last, score, n)
+        chain = best_chain(np.column_stack((first, last)), score)
         assert all(last[a] <= first[b] for a, b in pairwise(chain))
         best = 0.0
         for chosen in range(2 ** len(first)):
@@ -437,13 +462,14 @@ def test_demonstrations_of_few_samples_are_found():
     assert count_spotted(recognizer.spot(recording), truth) == Counts(3, 3, 3)
 
 
-def test_movements_of_one_recording_may_differ_in_pace():
+@pytest.mark.parametrize("fast", [0.5, 0.45])
+def test_movements_of_one_recording_may_differ_in_pace(fast):
     shown = kineme.load_lasa(["CShape", "NShape", "Sshape", "WShape"])
     recognizer = Recognizer().fit(shown[[k for k in range(28) if k % 7 < 3]])
     asked = shown[[k for k in range(28) if k % 7 > 2]]
     paced = [
         kineme.Trajectory(movement.times * pace, movement.positions, movement.label)
-        for movement, pace in zip(asked, np.resize([0.5, 1.0, 2.0], len(asked)), strict=True)
+        for movement, pace in zip(asked, np.resize([fast, 1.0, 2.0], len(asked)), strict=True)
     ]
     recording, truth, _ = concatenate(kineme.Demonstrations(paced), asked.labels, np.random.default_rng(0))
     assert count_spotted(recognizer.spot(recording), truth).n_right == len(truth)

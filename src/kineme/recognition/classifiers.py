@@ -23,7 +23,7 @@ from kineme.recognition.convolutions import Convolutions, Kernels, convolve, fit
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import N_MEANS, Described
-from kineme.similarity.scores import Classifier, Compared, most_similar
+from kineme.similarity.scores import Classifier, Compared, most_similar, nearest_of
 from kineme.similarity.similarity import SHARE, AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS, softmax
 from kineme.validation import Array
@@ -117,12 +117,12 @@ class NearestProfiled(NearestEach):
 
     def scores(self, compared: Compared) -> Array:
         """Return the logarithm of the average of all, (n, C)."""
-        others = [_nearest(logs, compared.references) for logs in self._others(compared)]
+        others = [nearest_of(logs, compared.references) for logs in self._others(compared)]
         return self._averaged(compared.nearest_each, others)
 
     def nearest_logs(self, compared: Compared) -> Array:
         """Return log similarity (n, C), by all kernels, to the nearest reference of each class."""
-        return _nearest(self._averaged(compared.log_average, self._others(compared)), compared.references)
+        return nearest_of(self._averaged(compared.log_average, self._others(compared)), compared.references)
 
     def logs_among(self, logs: Array, chosen: NDArray[np.intp]) -> Array:
         """Return log similarities (k, m) of chosen references to all, by all kernels."""
@@ -131,7 +131,7 @@ class NearestProfiled(NearestEach):
     def scores_without(self, left_out: LeftOut, references: References) -> Array:
         """Return scores (k, C) of references that are left out."""
         shown = [np.where(left_out.hidden, -np.inf, logs) for logs in self._of_references(left_out.chosen)]
-        return self._averaged(left_out.scores, [_nearest(logs, references) for logs in shown])
+        return self._averaged(left_out.scores, [nearest_of(logs, references) for logs in shown])
 
     def _others(self, compared: Compared) -> list[Array]:
         """Return logarithms (n, m) of the kernels on profiles and, where there are some, on values; computed once."""
@@ -178,11 +178,6 @@ def _standard(values: Array, center: Array, spread: Array) -> Array:
 def _log_kernel(squares: Array, width: float) -> Array:
     """Return the logarithm of a Gaussian of squared distances."""
     return np.asarray(-0.5 * np.maximum(squares, 0.0) / width**2)
-
-
-def _nearest(logs: Array, references: References) -> Array:
-    """Return the largest (n, C) of log similarities (n, m) to the references of each class."""
-    return np.asarray(np.maximum.reduceat(logs, references.first, axis=1))
 
 
 def _squares(rows: Array, others: Array) -> Array:

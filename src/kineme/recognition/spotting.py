@@ -36,7 +36,6 @@ from kineme.recognition.compared_windows import (
 )
 from kineme.recognition.conformal import Calibration, check_error_rate, class_probabilities, distances
 from kineme.recognition.edges import placed
-from kineme.recognition.levels import level_scores
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import References
 from kineme.similarity.scores import nearest, nearest_each, score
@@ -58,6 +57,9 @@ _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the te
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
+#: The same of a window that reaches from rest to rest, at most, in its own duration: it is no part of a movement, and a
+#: fast one is short. Of single strokes at three speeds 0.93 are found instead of 0.85.
+_OF_REST_TO_REST = 0.2
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 
 #: Shares of the duration that are cut off at the start and at the end: windows end at samples some hundredths apart.
@@ -126,11 +128,9 @@ def spot(
     rows, doubts = placed(windows.motion, rows, np.arange(len(rows)) < len(best), templates.levels, longest)
     if not len(rows):
         return []
-    logs, similar = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
-    if templates.levels is not None:
-        ends = np.column_stack((rows[:, 0], rows[:, 1] - 1))
-        away = level_scores(templates.levels, windows.motion, ends) * calibration.scales
-        logs, similar = (each - 0.5 * away**2 for each in (logs, similar))
+    away = templates.level_scores(windows.motion, rows - (0, 1)) * calibration.scales
+    by_path = score(comparison, references, pieces_of(timed, rows), nearest, nearest_each)
+    logs, similar = (each - 0.5 * away**2 for each in by_path)
     p_known = calibration.known_p_values(logs, error_rate)
     confidence = 1.0 - p_known
     confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
@@ -161,35 +161,40 @@ def _chosen(
     """Return samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
-    motion, typical = windows.motion, expected(templates.references, templates.levels is not None)
-    reach = far(error_rate, at_work=templates.levels is not None)
+    at_work = templates.levels is not None  # the reach is wide then, and holds many windows that cannot be chosen
+    motion, typical = windows.motion, expected(templates.references, at_work)
+    reach, manner = far(error_rate, at_work), Manner()
     around = surroundings(motion, windows.bouts, windows.rows)
-    manner = Manner()
 
     def matters(compared: ComparedWindows) -> Array:
         return most_nonconformity(compared, typical, around, manner, reach)
 
-    at_work = templates.levels is not None  # the reach is wide then, and holds many windows that cannot be chosen
     candidates = compare_candidates(templates, motion, windows.rows, reach, progress, matters if at_work else None)
     exact = matters(candidates.compared) if at_work else np.inf
     compared, chosen = candidates.weighted(), list[int]()
     for k in range(_PASSES):
         progress(1.0)
         scored = score_windows(compared, typical, around, manner, reach)
-        chosen = _best_windows(compared.rows, scored)
+        chosen = best_chain(compared.rows, scored.score)
         if k < _PASSES - 1:
             manner = manner_of(compared, typical, chosen, scored.best)
             doubtful = (compared.scores > exact) & (compared.scores < matters(compared))
             candidates = _completed(templates, motion, candidates, np.flatnonzero(doubtful.any(axis=1)))
             compared = candidates.weighted()
-    rows = compared.rows[chosen]
     spans = motion.times[compared.rows]
     alike = np.unique(np.concatenate((chosen, *alike_windows(spans, chosen)))).astype(np.intp)
-    distances = _completed(templates, motion, candidates, alike).compared.scores[alike] * templates.calibration.scales
-    distances /= reach * np.exp(np.log(templates.calibration.scales).mean())
     again = np.searchsorted(alike, chosen).tolist()
-    classes = closest_classes(compared.take(alike), distances, typical, manner, spans[alike], again)
-    return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
+    away = _distances(templates, motion, compared.rows[alike])
+    away /= reach * np.exp(np.log(templates.calibration.scales).mean())
+    classes = closest_classes(compared.take(alike), away, typical, manner, spans[alike], again)
+    return compared.rows[chosen] + (0, 1), classes
+
+
+def _distances(templates: Templates, motion: Motion, rows: Rows) -> Array:
+    """Return distances (n, C) of windows to each class, in each representation to its own nearest demonstration."""
+    windows = Demonstrations.of_movements(resampled(motion, *motion.times[rows].T))
+    (similar,) = score(templates.comparison, templates.references, windows, nearest_each)
+    return np.hypot(distances(similar), templates.level_scores(motion, rows) * templates.calibration.scales)
 
 
 def _completed(templates: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Candidates:
@@ -203,15 +208,10 @@ def _completed(templates: Templates, motion: Motion, candidates: Candidates, cho
     return candidates._replace(compared=replace(candidates.compared, scores=scores), completely=completely)
 
 
-def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
-    """Return the chain of windows of largest summed score."""
+def best_chain(rows: Rows, score: Array) -> list[int]:
+    """Return windows, rows (n, 2), that do not overlap, of largest summed score: dynamic programming."""
     boundaries = np.unique(np.append(0, rows))
-    first, last = np.searchsorted(boundaries, rows).T
-    return best_chain(first, last, scored.score, len(boundaries))
-
-
-def best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
-    """Return windows between n boundaries that do not overlap, of largest summed score: dynamic programming."""
+    (first, last), n = np.searchsorted(boundaries, rows).T, len(boundaries)
     positive = np.flatnonzero(score > 0)
     ordered = positive[np.argsort(last[positive], kind="stable")]
     of = np.searchsorted(last[ordered], np.arange(n + 1)).tolist()
@@ -318,14 +318,12 @@ def expected(references: References, at_work: bool = False) -> Expected:
     demos = references.all_movements()
     sizes, slowness = size_and_slowness(relative_rows(demos, 0, len(demos), N_POINTS))
     lasting = durations_of(references)
-    log_durations = None if lasting is None else np.log(lasting)
 
     def medians(values: Array) -> Array:
         return np.array([np.median(values[rows]) for rows in references.slices()])
 
-    lasting = None if log_durations is None else medians(log_durations)
-    costs = _OF_WINDOWS_AT_WORK if at_work else _OF_WINDOWS
-    return Expected(lasting, medians(sizes), medians(slowness), costs)
+    log_durations = None if lasting is None else medians(np.log(lasting))
+    return Expected(log_durations, medians(sizes), medians(slowness), _OF_WINDOWS_AT_WORK if at_work else _OF_WINDOWS)
 
 
 def alike_windows(spans: Array, chosen: list[int]) -> list[NDArray[np.intp]]:
@@ -387,14 +385,14 @@ def score_windows(
 
     The cost of a window is its nonconformity to the class, in the `reach` at which a window counts as far, plus squared
     logarithms of the ratios of its duration and size to those expected, plus costs of ends in motion and of rests
-    inside. The score is ``(1 - cost) * duration / typical duration`` where positive, less a cost per movement: so that
-    a whole movement is preferred to its parts, and no part of it is a movement by chance.
+    inside. The score is ``(1 - cost) * duration / typical duration`` where positive, less a cost per movement (less for
+    a short one from rest to rest): so that a whole movement is preferred to its parts, and no part is one by chance.
     """
-    others, counts = _other_costs(compared, typical, around, manner)
+    others, counts, per_movement = _other_costs(compared, typical, around, manner)
     costs = compared.scores / reach + others
     best = costs.argmin(axis=1)
     closeness = np.maximum(1.0 - costs[np.arange(len(best)), best], 0.0)
-    return ScoredWindows(best, closeness * counts - _PER_MOVEMENT)
+    return ScoredWindows(best, closeness * counts - per_movement)
 
 
 def most_nonconformity(
@@ -404,20 +402,22 @@ def most_nonconformity(
 
     The scores of the windows themselves have no part in it.
     """
-    others, counts = _other_costs(compared, typical, around, manner)
-    return np.asarray(reach * (1.0 - others - (_PER_MOVEMENT / counts)[:, None]))
+    others, counts, per_movement = _other_costs(compared, typical, around, manner)
+    return np.asarray(reach * (1.0 - others - (per_movement / counts)[:, None]))
 
 
 def _other_costs(
     compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner
-) -> tuple[Array, Array]:
-    """Return costs (n, C) beside the nonconformity, and durations (n,) in typical ones."""
+) -> tuple[Array, Array, Array]:
+    """Return costs (n, C) beside the nonconformity; durations, and costs of one more movement (n,), in typical ones."""
     costs = _manner_costs(compared, typical, manner, *typical.costs)
     costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
     edges = _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest + _SPANNED * around.rests_inside
     lasting = compared.log_durations
     usual = float(np.median(lasting)) if typical.log_durations is None else float(np.median(typical.log_durations))
-    return costs + edges[:, None], np.exp(lasting - (usual + (manner.tempo or 0.0)))
+    counts = np.exp(lasting - (usual + (manner.tempo or 0.0)))
+    short = np.where(around.far_from_rest == 0, _OF_REST_TO_REST * counts, np.inf)
+    return costs + edges[:, None], counts, np.minimum(_PER_MOVEMENT, short)
 
 
 def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:

@@ -74,7 +74,7 @@ class Compared:
     @cached_property
     def nearest(self) -> Array:
         """Log similarity to the nearest reference of each class, (n, C)."""
-        return np.asarray(np.maximum.reduceat(self.log_average, self.references.first, axis=1))
+        return nearest_of(self.log_average, self.references)
 
     @cached_property
     def nearest_each(self) -> Array:
@@ -105,6 +105,11 @@ class Classifier(Protocol):
     def logs_among(self, logs: Array, chosen: Indices) -> Array:
         """Return such similarities of chosen references to all, (k, m); `logs` are those of the averaged kernel."""
         return logs
+
+
+def nearest_of(logs: Array, references: References) -> Array:
+    """Return the largest (n, C) of log similarities (n, m) to the references of each class."""
+    return np.asarray(np.maximum.reduceat(logs, references.first, axis=1))
 
 
 Score = Callable[[Compared], Array]

@@ -119,8 +119,9 @@ def test_who_made_the_templates_is_told_where_others_did(of_people, monkeypatch)
     np.testing.assert_array_equal(other, of_people.people[train[3]])
     fitted = DefaultRecognizer(None, of_people.people)
     fitted.fit(of_people.demonstrations)
+    # On some processors rounding in single precision depends on where arrays lie in memory.
     expected = Recognizer().fit(of_people.demonstrations, groups=of_people.people).calibration()
-    np.testing.assert_array_equal(fitted.recognizer.calibration().scales, expected.scales)
+    np.testing.assert_allclose(fitted.recognizer.calibration().scales, expected.scales, rtol=1e-6)
 
 
 def test_movements_of_unknown_classes_must_not_be_found(of_people, monkeypatch):
