@@ -206,3 +206,12 @@ def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):
         rows = [f"{i / 100},{i * k},{i * i}" for i in range(50)]
         (tmp_path / f"{k}.csv").write_text("\n".join([("time,x,y", "time,y,x", "time,x [mm],y [mm]")[k % 3], *rows]))
     assert "one clock" not in commands.run("inspect", tmp_path).stdout
+
+
+def test_a_symbol_is_found_in_recordings_that_are_joined(folder, tmp_path):
+    actions = tmp_path / "actions"
+    commands.run("learn", folder, "--join-files", "--library", actions)
+    found = json.loads(commands.run("find", "wave", folder, "--join-files", "--library", actions, "--json").stdout)
+    assert {hit["recording"] for hit in found["hits"]} <= {"nod/one", "wave/one", "wave/two"}
+    assert found["recordings"] == 3
+    assert found["hits"]

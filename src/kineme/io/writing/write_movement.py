@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
@@ -177,7 +178,7 @@ def distinct_stems(movements: Sequence[Movement]) -> list[str]:
     for recording, place in movements:
         path = PurePosixPath(recording)
         parts = [*(part for part in path.parts[:-1] if part not in {"/", "..", "."}), path.stem, place]
-        stem = "-".join(_plain(part) for part in parts if part).strip(".") or "recording"
+        stem = "-".join(re.sub(r"[^\w.-]", "_", part) for part in parts if part).strip(".") or "recording"
         name, k = stem, 1
         while name.lower() in taken:
             k += 1
@@ -185,7 +186,3 @@ def distinct_stems(movements: Sequence[Movement]) -> list[str]:
         taken.add(name.lower())
         stems.append(name)
     return stems
-
-
-def _plain(part: str) -> str:
-    return "".join(mark if mark.isalnum() or mark in "-_." else "_" for mark in part)

@@ -224,7 +224,10 @@ class OpenedRecordings:
             for k in wanted:  # those asked for last are let go last
                 if k in self._episodes:
                     self._episodes[k] = self._episodes.pop(k)
-            sizes = {k: _size(item.episode) for k, item in self._episodes.items()}
+            sizes = {
+                k: sum(values.nbytes for values in (item.episode.times, *item.episode.signals.values()))
+                for k, item in self._episodes.items()
+            }
             total = sum(sizes.values())
             for k in [k for k in self._episodes if k not in wanted]:
                 if total <= self.held:
@@ -336,8 +339,3 @@ def opened_at(path: Path) -> Iterator[Opened]:
             episode = Episode(number, demos.times[rows].copy(), values, names, label, place=where)
             yield Opened(episode, entry.name, source.place, entry.path)
             number += 1
-
-
-def _size(episode: Episode) -> int:
-    """Bytes of the arrays of an episode."""
-    return episode.times.nbytes + sum(values.nbytes for values in episode.signals.values())
