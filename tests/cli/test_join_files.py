@@ -208,10 +208,19 @@ def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):
     assert "one clock" not in commands.run("inspect", tmp_path).stdout
 
 
-def test_a_symbol_is_found_in_recordings_that_are_joined(folder, tmp_path):
-    actions = tmp_path / "actions"
-    commands.run("learn", folder, "--join-files", "--library", actions)
-    found = json.loads(commands.run("find", "wave", folder, "--join-files", "--library", actions, "--json").stdout)
-    assert {hit["recording"] for hit in found["hits"]} <= {"nod/one", "wave/one", "wave/two"}
-    assert found["recordings"] == 3
-    assert found["hits"]
+def test_a_symbol_is_found_in_recordings_that_are_joined(tmp_path):
+    def waved(t):
+        return np.column_stack([np.cos(5 * t), t, 0 * t])
+
+    for name, movement in {"wave/one": waved, "wave/two": waved, "nod/one": spatial, "nod/two": spatial}.items():
+        for sensor, rate in (("Accelerometer", 100), ("Gyroscope", 50)):
+            t = clock(rate, 0, 2)
+            values = movement(t) if sensor == "Accelerometer" else movement(t)[:, ::-1]
+            table(tmp_path / "log" / name / f"{sensor}.csv", ["z", "y", "x"], t, values.tolist())
+    t = clock(25, 5, 6)  # of none of the columns of the library: passed over
+    table(tmp_path / "log" / "wave" / "one" / "Marks.csv", ["u"], t, t[:, None].tolist())
+    actions, log = tmp_path / "actions", tmp_path / "log"
+    commands.run("learn", log, "--join-files", "--library", actions)
+    found = json.loads(commands.run("find", "wave", log, "--join-files", "--library", actions, "--json").stdout)
+    assert sorted(hit["recording"] for hit in found["hits"]) == ["wave/one", "wave/two"]
+    assert found["recordings"] == 4

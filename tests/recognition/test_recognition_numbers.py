@@ -136,7 +136,10 @@ def test_three_percent_of_noise_are_smoothed_away_and_shapes_are_not():
 
 
 def _scored(factor, manner=Manner(), around=(0.0, 1e-9, 0.0)):  # noqa: B008 - a frozen record
-    """Score of a window that holds a demonstration done slower, and its cost for not being the demonstration itself."""
+    """Score of a window that holds a demonstration done slower, and its cost for not being the demonstration itself.
+
+    It does not quite reach from rest to rest: else a short one would pay less.
+    """
     demos = draw_shapes([1, 1, 1])
     demos = Demonstrations([Trajectory(np.linspace(0, 2, 80), x.positions, x.label) for x in demos])
     recognizer = Recognizer().fit(demos)

@@ -158,11 +158,16 @@ def pieces(paths: Sequence[Path], options: dict[str, Any], library: Any, places:
 
 
 def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, places: Any = None) -> Any:
-    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them."""
+    """Read recordings file by file, data sets some episodes at a time; what cannot be read is a problem among them.
+
+    Files that are joined are read all at once.
+    """
     from kineme.io.reading.pieces import read_pieces
 
     if any(str(path) == "-" for path in paths):
         raise click.UsageError("expected files or folders to search, got the standard input")
+    if options.get("join_files"):  # files of a folder are one recording
+        return iter([read(paths, options, library)])
     return read_pieces(paths, _how(options, library), places)
 
 

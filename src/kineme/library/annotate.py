@@ -104,7 +104,7 @@ def find(
             report = annotate_by(classes, piece, error_rate)
         except KinemeError as error:  # other columns than those of the library, most likely
             paths = dict.fromkeys(source.path for source in piece.sources)
-            problems += [Problem(path, None, str(error), type(error)) for path in paths]
+            problems += [*piece.problems, *(Problem(path, None, str(error), type(error)) for path in paths)]
             continue
         hits += [annotation for annotation in report.annotations if annotation.symbol in symbols]
         problems += [*piece.problems, *report.problems]

@@ -364,8 +364,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         with all demonstrations. They start and end at rests, at minima of speed and, where these are far apart, at even
         times. Chosen is the chain of windows that do not overlap with the largest summed score; a window scores its
         duration, less the more it differs from the class: in the averaged kernel, and in duration and size, given the
-        tempo and the size of the whole recording, which are estimated from what is found. Its class is that of the
-        nearest demonstration, to this window or to one that begins and ends nearly there.
+        tempo and the size of the whole recording, which are estimated from what is found. Its class is that to which
+        this window, or one that begins and ends nearly there, is nearest, as by ``classifier="nearest-each"``.
 
         Parameters
         ----------

@@ -57,8 +57,8 @@ _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the te
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
-#: The same of a window that reaches from rest to rest, at most, in its own duration: it is no part of a movement, and a
-#: fast one is short. Of single strokes at three speeds 0.93 are found instead of 0.85.
+#: The same from rest to rest, in durations of the window, where that is less: a short window between rests is rather a
+#: fast movement than a part of one. Of single strokes at three speeds 0.93 are found instead of 0.85.
 _OF_REST_TO_REST = 0.2
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 
@@ -349,11 +349,11 @@ def closest_classes(
     """Return class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
 
     Which window is chosen depends on its duration, its size, and what surrounds it; these differ between people. The
-    class is that of the nearest demonstration, wherever exactly the movement starts and ends: the distance, not over
-    the scale of the class, and small costs of duration and size.
+    class is the nearest one by `NearestEach`, wherever exactly the movement starts and ends: the distance, not over the
+    scale of the class, and small costs of duration and size.
 
-    `compared`: n windows, sorted by starts; `distances` (n, C): to the nearest demonstration of each class, in that at
-    which a window counts as far; `spans` (n, 2): start and end of each window [s]; `chosen`: windows.
+    `compared`: n windows, sorted by starts; `distances` (n, C): to each class, in that at which a window counts as
+    far; `spans` (n, 2): start and end of each window [s]; `chosen`: windows.
     """
     costs = distances + _manner_costs(compared, typical, manner, *_OF_CLASSES)
     return np.array([costs[near].min(axis=0).argmin() for near in alike_windows(spans, chosen)], dtype=np.intp)

@@ -17,9 +17,6 @@ from kineme.io.reading.recordings import TASK, HowToRead, check_asked, heads_of,
 from kineme.io.records import Problem, needs
 from kineme.movements.episodes import number_at
 
-Files = Sequence[Entry]
-Pieces = Iterator[Recordings | Problem]
-
 
 def is_episodic(path: Path) -> bool:
     """Tell whether a path is a data set whose episodes are read some at a time."""
@@ -27,34 +24,32 @@ def is_episodic(path: Path) -> bool:
     return data_set is not None and data_set.marker == MARKER
 
 
-def read_pieces(paths: Sequence[Path], how: HowToRead, places: Collection[str] | None = None) -> Pieces:
+def read_pieces(
+    paths: Sequence[Path], how: HowToRead, places: Collection[str] | None = None
+) -> Iterator[Recordings | Problem]:
     """Yield recordings of files, folders and patterns, as `read_paths` reads them, or the problem with a file.
 
-    Each piece has the channels of its own samples; it is a folder where its files are joined. A data set that is read
-    some episodes at a time has no checksum; of it only the episodes at these `places` are read, all at once, if any.
+    Each piece has the channels of its own samples. A data set that is read some episodes at a time has no checksum; of
+    it only the episodes at these `places` are read, all at once, if there are any.
     """
     entries, problems = entries_of(paths, how.follow_links)
     yield from problems
     numbers = None if places is None else {number for place in places if (number := number_at(place)) is not None}
-    folders: dict[Path, list[Entry]] = {}
     for entry in entries:
-        joined = how.join and not is_episodic(entry.path)
-        folders.setdefault(entry.path.parent if joined else entry.path, []).append(entry)
-    for entry, *beside in folders.values():
-        yield from read_entry(entry, how, numbers, beside)
+        yield from read_entry(entry, how, numbers)
 
 
-def read_entry(entry: Entry, how: HowToRead, numbers: Collection[int] | None = None, beside: Files = ()) -> Pieces:
+def read_entry(entry: Entry, how: HowToRead, numbers: Collection[int] | None = None) -> Iterator[Recordings | Problem]:
     """Yield the recordings of a file or data set, of the latter some episodes at a time, or the problem with it.
 
-    Of a data set, the episodes with these `numbers` are read, at once unless they are a range; of a Parquet file, the
-    movements that begin in a range of groups of rows, without a checksum. `beside`: files that may be joined with it.
+    Of a data set, the episodes with these `numbers` are read, all at once unless they are a range. Of a file of
+    Parquet, it is a range of groups of rows: the movements that begin in them are read, without a checksum.
     """
     try:
         if isinstance(numbers, range) or is_episodic(entry.path):
             yield from _in_parts(entry, how, numbers)
         else:
-            recordings = read_entries([entry, *beside], how)
+            recordings = read_entries([entry], how._replace(join=False))
             check_asked(how.layout, heads_of(recordings), recordings.people is not None, entry.name)
             yield recordings
     except (KinemeError, OSError) as error:
@@ -62,7 +57,7 @@ def read_entry(entry: Entry, how: HowToRead, numbers: Collection[int] | None = N
         yield Problem(entry.name, None, reason, type(error) if isinstance(error, KinemeError) else KinemeError)
 
 
-def _in_parts(entry: Entry, how: HowToRead, numbers: Collection[int] | None) -> Pieces:
+def _in_parts(entry: Entry, how: HowToRead, numbers: Collection[int] | None) -> Iterator[Recordings | Problem]:
     """Yield the whole episodes of a data set, and why others are not; or the movements of some groups of rows."""
     with needs("pyarrow", "read Parquet", "parquet"):
         from kineme.io.lerobot.read import lerobot_parts
