@@ -35,10 +35,10 @@ from kineme.recognition.spotting import (
     Expected,
     Manner,
     Spotted,
+    _best_chain,
     _completed,
     _distances,
     _left_over,
-    best_chain,
     closest_classes,
     durations_of,
     far,
@@ -388,7 +388,7 @@ def test_the_best_chain_is_that_of_all_chains():
         n = int(rng.integers(2, 7))
         first, last = (side[:12] for side in rng.permutation(np.array(np.triu_indices(n, 1)).T).T)
         score = rng.normal(size=len(first))
-        chain = best_chain(np.column_stack((first, last)), score)
+        chain = _best_chain(np.column_stack((first, last)), score)
         assert all(last[a] <= first[b] for a, b in pairwise(chain))
         best = 0.0
         for chosen in range(2 ** len(first)):

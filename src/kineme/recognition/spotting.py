@@ -175,7 +175,7 @@ def _chosen(
     for k in range(_PASSES):
         progress(1.0)
         scored = score_windows(compared, typical, around, manner, reach)
-        chosen = best_chain(compared.rows, scored.score)
+        chosen = _best_chain(compared.rows, scored.score)
         if k < _PASSES - 1:
             manner = manner_of(compared, typical, chosen, scored.best)
             doubtful = (compared.scores > exact) & (compared.scores < matters(compared))
@@ -208,7 +208,7 @@ def _completed(templates: Templates, motion: Motion, candidates: Candidates, cho
     return candidates._replace(compared=replace(candidates.compared, scores=scores), completely=completely)
 
 
-def best_chain(rows: Rows, score: Array) -> list[int]:
+def _best_chain(rows: Rows, score: Array) -> list[int]:
     """Return windows, rows (n, 2), that do not overlap, of largest summed score: dynamic programming."""
     boundaries = np.unique(np.append(0, rows))
     (first, last), n = np.searchsorted(boundaries, rows).T, len(boundaries)
