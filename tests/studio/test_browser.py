@@ -770,7 +770,8 @@ def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters)
 
 def test_an_arm_executes_a_letter(opened, served_letters):
     pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-    page = opened(served_letters, reduced_motion="no-preference")
+    # What moves is painted sixty times a second: in a small window that is little.
+    page = opened(served_letters, reduced_motion="no-preference", width=480, height=320)
     page.evaluate("history.replaceState(null, '', '#robot')")  # shown when it is loaded again
     held = []  # arms are asked for before and after the library is there; the first answer comes last
     page.route("**/api/robots", lambda route, _: route.continue_() if held else held.append(route))

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from kineme import read_recordings
 from kineme.errors import DataError
+from kineme.io.reading.episodes import read_episodes
 from kineme.io.reading.read_labels import labeled_pieces, read_labels
 from kineme.io.writing.annotations import Annotation, write_annotations
 from kineme.library.correct import as_labels, corrections_beside, corrections_of, motions_in
@@ -415,6 +416,16 @@ def test_episodes_that_are_files_of_their_own_are_named_so(tmp_path, monkeypatch
     monkeypatch.setattr(opened_module, "read_episodes", lambda path: iter(episodes))
     (tmp_path / "0.h5").write_bytes(b"")
     assert [item.movement for item in opened_at(tmp_path)] == [("0.h5", ""), (tmp_path.name, "1.h5")]
+
+
+def test_a_data_set_is_opened_as_episodes_with_all_their_signals_and_a_table_as_a_file(tmp_path):
+    written = write_v3(tmp_path / "set", (30, 40))
+    assert [(item.file, sorted(item.episode.signals)) for item in opened_at(written)] == [
+        (None, sorted(episode.signals)) for episode in read_episodes(written)
+    ]
+    table = tmp_path / "0.csv"
+    table.write_text("\n".join(["t,x,y", *(f"{k / 10},{k},{k * k}" for k in range(20))]))
+    assert [item.file for item in opened_at(table)] == [table]
 
 
 def test_a_data_set_in_lance_is_opened_too(folder, open_studio, tmp_path):
