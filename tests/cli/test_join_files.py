@@ -8,8 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
+from kineme.cli.reading import files_of
 from kineme.io.reading.recordings import HowToRead, NameRule, read_paths
 from kineme.movements.tables.layout import Known, Layout
+from lerobot_sets import write_v3
 
 BEGIN = 1_700_000_000.0  # s since 1970
 
@@ -224,3 +226,10 @@ def test_a_symbol_is_found_in_recordings_that_are_joined(tmp_path):
     found = json.loads(commands.run("find", "wave", log, "--join-files", "--library", actions, "--json").stdout)
     assert sorted(hit["recording"] for hit in found["hits"]) == ["wave/one", "wave/two"]
     assert found["recordings"] == 4
+
+
+def test_a_data_set_is_read_some_episodes_at_a_time_whether_files_are_joined_or_not(tmp_path):
+    folder = write_v3(tmp_path / "set", (30, 40, 50))
+    for options in ({}, {"join_files": True}):
+        (piece,) = files_of([folder], options, None, places=["episode 1"])
+        assert [source.place for source in piece.sources] == ["episode 1"]

@@ -166,7 +166,7 @@ def files_of(paths: Sequence[Path], options: dict[str, Any], library: Any, place
 
     if any(str(path) == "-" for path in paths):
         raise click.UsageError("expected files or folders to search, got the standard input")
-    if options.get("join_files"):  # files of a folder are one recording
+    if options.get("join_files") and _data_sets(paths) is None:  # files of a folder are one recording
         return iter([read(paths, options, library)])
     return read_pieces(paths, _how(options, library), places)
 

@@ -47,7 +47,7 @@ _REACH = 0.975  # nonconformity at which a window counts as far, in that which m
 #: 0.975, 0.9 at 1.9. Of wiping that was not shown all stays unknown, of pressing 0.9 and 0.4: the rest are reaches.
 _REACH_AT_WORK = 1.9
 #: Costs of a duration, and of a size, e times what is expected, of a window. People change pace from one movement to
-#: the next: at 0.4 for durations, 0.71 of single strokes at three speeds are found instead of 0.83.
+#: the next: at 0.4 for durations, 0.71 of single strokes at three speeds were found instead of 0.83, other costs alike.
 _OF_WINDOWS = 0.05, 0.2
 #: The same where levels of a gripper tell movements apart: arms at work keep their pace. Of eight simulated sets,
 #: boundaries have a mean F1 of 0.912 with these costs and of 0.907 with those above.
@@ -58,7 +58,7 @@ _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a 
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
 #: The same from rest to rest, in durations of the window, where that is less: a short window between rests is rather a
-#: fast movement than a part of one. Of single strokes at three speeds 0.93 are found instead of 0.85.
+#: fast movement than a part of one. Of single strokes at three speeds 0.93 by others are found instead of 0.84.
 _OF_REST_TO_REST = 0.2
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 
