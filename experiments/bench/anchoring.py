@@ -1,6 +1,6 @@
 """Anchoring: whether the clusters that are proposed without labels are the classes that people drew.
 
-By several people: gestures in space from the folder that KINEME_RECORDINGS names, see `bench.by_person`.
+By several people: gestures in space and exercises from the folder that KINEME_RECORDINGS names, see `bench.by_person`.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def measure(quick: bool) -> list[Row]:
 
 
 def _by_people() -> list[Row]:
-    """Digits, solids and both by all people at once, named or not, and by each alone; of the default method."""
-    path = FOLDER / "gestures3d.npz"
+    """Digits, solids and both by all people at once, named or not, and by each alone; exercises; the default method."""
+    path, exercises = FOLDER / "gestures3d.npz", FOLDER / "exercises6d.npz"
     if not path.is_file():
         print(f"anchoring: no {path.name} in {FOLDER}; name the folder in KINEME_RECORDINGS")
         return []
@@ -62,13 +62,23 @@ def _by_people() -> list[Row]:
         own = [data.demonstrations[np.flatnonzero(chosen & (people == one))] for one in np.unique(people)]
         scores = [_score(some, some.labels, DEFAULT_METHOD) for some in own]
         rows.append(Row(f"{name}: ARI, one person, mean", "", float(np.mean(scores)), target=(">=", 0.95)))
-        some, who = data.demonstrations[np.flatnonzero(chosen)], people[chosen]
-        for told, groups in (("", None), (", named", who)):
-            started = perf_counter()
-            found = len(propose(some, groups=groups))
-            details = {"found": found, "classes": len(np.unique(some.labels)), "seconds": perf_counter() - started}
-            score = _score(some, some.labels, DEFAULT_METHOD, groups)
-            rows.append(Row(f"{name}: ARI, {len(own)} people{told}", "", score, target=(">=", 0.9), details=details))
+        rows += _by_all(name, data.demonstrations[np.flatnonzero(chosen)], people[chosen])
+    if exercises.is_file():
+        at_a_wrist = load_data(str(exercises))
+        rows += _by_all("exercises", at_a_wrist.demonstrations, np.asarray(at_a_wrist.people))
+    return rows
+
+
+def _by_all(name: str, movements: Any, people: NDArray[Any]) -> list[Row]:
+    """All people at once, named or not."""
+    rows = []
+    for told, groups in (("", None), (", named", people)):
+        started = perf_counter()
+        found = len(propose(movements, groups=groups))
+        details = {"found": found, "classes": len(np.unique(movements.labels)), "seconds": perf_counter() - started}
+        score = _score(movements, movements.labels, DEFAULT_METHOD, groups)
+        what = f"{name}: ARI, {len(np.unique(people))} people{told}"
+        rows.append(Row(what, "", score, target=(">=", 0.9), details=details))
     return rows
 
 

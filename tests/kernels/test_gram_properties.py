@@ -62,7 +62,13 @@ def test_positive_semidefinite_where_the_table_says_so(name, kind, seed):
     assert lowest_eigenvalue(NAMED[name](rows(kind, seed))) > -1e-11
 
 
-@pytest.mark.parametrize(("name", "mean"), [(name, mean) for name, row in KERNELS.items() for mean in row.psd_means])
+def psd_means(row):
+    """Means whose average of a kernel is proved positive semi-definite."""
+    proved = {"always": row.psd, "infinitely divisible": row.infinitely_divisible, "not claimed": False}
+    return tuple(name for name, mean in MEANS.items() if proved[mean.psd])
+
+
+@pytest.mark.parametrize(("name", "mean"), [(name, mean) for name, row in KERNELS.items() for mean in psd_means(row)])
 @given(kind=st.sampled_from(KINDS), seed=seeds)
 @settings(max_examples=examples(12, 40), deadline=None)
 def test_averages_positive_semidefinite_where_the_table_says_so(name, mean, kind, seed):
@@ -102,6 +108,6 @@ def test_geometric_mean_of_truncated_has_a_counterexample():
 
 
 def test_the_table_states_the_proofs():
-    assert KERNELS["rbf"].psd_means == KERNELS["laplacian"].psd_means == ("arithmetic", "geometric")
-    assert KERNELS["truncated"].psd_means == KERNELS["canberra"].psd_means == ("arithmetic",)
+    assert psd_means(KERNELS["rbf"]) == psd_means(KERNELS["laplacian"]) == ("arithmetic", "geometric")
+    assert psd_means(KERNELS["truncated"]) == psd_means(KERNELS["canberra"]) == ("arithmetic",)
     assert KERNELS["truncated"].widths == ("m", "sigma")

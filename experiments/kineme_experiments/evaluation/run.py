@@ -20,7 +20,7 @@ from kineme.reporting.atomic import write_atomically
 from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
 from kineme.reporting.figures import encode_figure, new_figure
 from kineme.reporting.page import page, picture
-from kineme.reporting.table import Table, mean_and_range, to_html
+from kineme.reporting.table import Table, to_html
 from kineme.reporting.text import in_markup
 from kineme_experiments.evaluation.conclusions import MEASURES, best_rival, columns, conclusion, sentences
 from kineme_experiments.evaluation.conditions import Condition
@@ -33,6 +33,7 @@ from kineme_experiments.evaluation.results import Results, collect
 from kineme_experiments.evaluation.rows import Row, make_rows
 from kineme_experiments.evaluation.score_split import Scores, does, score_split
 from kineme_experiments.evaluation.trials import TASKS, Settings
+from kineme_experiments.ranges import mean_and_range
 
 _BLACK = "#222222"
 _AXES = {

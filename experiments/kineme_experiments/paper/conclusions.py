@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean
 from typing import NamedTuple
 
-from kineme.reporting.table import mean_and_range
+from kineme_experiments.ranges import mean_and_range
 
 #: Column -> the accuracy of each draw.
 ByColumn = Mapping[str, Sequence[float]]

@@ -20,7 +20,7 @@ import sklearn
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.page import page, picture
-from kineme.reporting.table import Table, mean_and_range, to_html
+from kineme.reporting.table import Table, to_html
 from kineme.reporting.text import in_markup
 from kineme.runtime.parallel import n_threads
 from kineme_experiments.paper import paper
@@ -31,6 +31,7 @@ from kineme_experiments.paper.conclusions import read_ahead, read_left_out, read
 from kineme_experiments.paper.experiments import features_and_labels, run_nearest, run_svm, usable
 from kineme_experiments.paper.protocol import draw
 from kineme_experiments.paper.representations import READINGS
+from kineme_experiments.ranges import mean_and_range
 
 _PLANE, _ARM = "the plane", "the arm"
 

@@ -7,7 +7,7 @@ from statistics import fmean
 import numpy as np
 
 from kineme.datasets.lasa import LASA_26
-from kineme.reporting.table import Table, mean_and_range
+from kineme.reporting.table import Table
 from kineme_experiments.paper import paper
 from kineme_experiments.paper.columns import (
     CLOSEST,
@@ -34,6 +34,7 @@ from kineme_experiments.paper.conclusions import (
     read_widths,
 )
 from kineme_experiments.paper.representations import READINGS, REPRESENTATIONS
+from kineme_experiments.ranges import mean_and_range
 
 _PAPER_SAYS = (
     'The paper says "f(t)" for what Eqs. (1) and (4) call f and for the shape-attractor, and prints neither gating nor '

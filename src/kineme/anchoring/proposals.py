@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring import clustering
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.trajectory import MovementsLike
+from kineme.recognition.classifiers import squares_beside_kernels
 from kineme.recognition.conformal import check_groups, comparable_groups
 from kineme.reporting.text import counted
 from kineme.similarity.describe import Described, describe, squared_distances
@@ -223,10 +224,10 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     """Cluster movements without labels.
 
     By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
-    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fuse`. So movements of
-    several people connect, of whom each repeats the own way more closely than that of others. Name who made each
-    movement by `groups` where that is known: it is the better the more similar classes are. The other methods take
-    distances ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
+    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fuse`. Profiles and recorded values
+    are among them where `Recognizer` takes these. So movements of several people connect, of whom each repeats the own
+    way more closely than that of others. Name who made each by `groups` where that is known: it is the better the more
+    similar classes are. The other methods take distances ``1 - K`` of the averaged kernel: what is far is just far.
 
     Parameters
     ----------
@@ -319,7 +320,10 @@ def _by_neighbors(
     clusters = np.full(len(described), -1, dtype=np.intp)
     if len(large) < 3:
         return clusters, np.empty(0)
-    squares, weights = squares[:, large[:, None], large], described.own_weights
+    shares, others = squares_beside_kernels(described.take(large))
+    own = np.ones(len(squares)) if described.own_weights is None else np.array(described.own_weights)
+    weights = np.append((1.0 - shares.sum()) * own / own.sum(), shares)
+    squares = np.concatenate((squares[:, large[:, None], large], others))
     similar = clustering.fuse(squares, weights)
     who = None if people is None else people[large]
     if who is not None:

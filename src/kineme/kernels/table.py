@@ -477,12 +477,6 @@ class KernelRow:
         """Names of the parameters of the kernel."""
         return self.kernel._width_names()
 
-    @property
-    def psd_means(self) -> tuple[str, ...]:
-        """Means of `MEANS` whose average of this kernel is proved positive semi-definite."""
-        proved = {"always": self.psd, "infinitely divisible": self.infinitely_divisible, "not claimed": False}
-        return tuple(name for name, mean in MEANS.items() if proved[mean.psd])
-
 
 #: Name of a kernel -> its class, its formula, and what is proved of it.
 KERNELS: dict[str, KernelRow] = {

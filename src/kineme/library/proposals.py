@@ -23,9 +23,11 @@ from kineme.recognition.answer import KnownClasses, open_set_labels
 from kineme.recognition.classifiers import MOST
 from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
-from kineme.similarity.describe import Described, with_values
+from kineme.similarity.describe import Described, recorded_values, values_count
 from kineme.similarity.similarity import similarities
+from kineme.similarity.specification import ComparisonSpecification
 
+_TILE = 5000  # movements that are read at once
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 
 _DISCOVER = "discover"  # action of the versions that store proposals
@@ -106,9 +108,18 @@ def _clustered(
     if classes is not None:
         members = described_as_known(store, ids, classes)
         return assignment.assign_described(members, classes, min_members=min_members).proposals
-    members, like = described(store, ids), store.specification.comparison
-    how, people = method or DEFAULT_METHOD, groups_of(store, ids)
+    like, people = store.specification.comparison, groups_of(store, ids)
+    members = _with_values(store, ids, described(store, ids), like)
+    how = method or DEFAULT_METHOD
     return propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
+
+
+def _with_values(store: Store, ids: Ids, features: Described, how: ComparisonSpecification) -> Described:
+    """Add recorded values where they count; movements are read for that, some at a time."""
+    if not values_count(features, how):
+        return features
+    tiles = (read.movements(store, ids[start : start + _TILE]) for start in range(0, len(ids), _TILE))
+    return replace(features, values=np.concatenate([recorded_values(tile, 0, len(tile)) for tile in tiles]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +275,7 @@ def described_as_known(store: Store, ids: Ids, classes: KnownClasses) -> Describ
     features = described(store, ids, classes.comparison)
     if classes.references.described.values is None:
         return features
-    return with_values(features, read.movements(store, ids), 0, len(ids), classes.comparison.specification)
+    return _with_values(store, ids, features, classes.comparison.specification)
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:

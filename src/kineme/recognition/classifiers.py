@@ -345,16 +345,34 @@ def _width(squares: Array, references: References) -> float:
 
 def _values(references: References) -> Values | None:
     """Return the recorded values of the references; None where they tell classes no more apart than rounding does."""
-    values = references.described.values
-    if values is None:
+    if references.described.values is None:
         return None
+    center, spread = _center_and_spread(references.described.values)
+    rows = _standard(references.described.values, center, spread)
+    width = _width(_squares(rows, rows), references)
+    return Values(center, spread, rows, width) if _SAME < width < np.inf else None
+
+
+def _center_and_spread(values: Array) -> tuple[Array, Array]:
+    """Return means (d, 9) of values (n, d, 9), and the standard deviation (d, 1) of each column in all of them."""
     spread = np.sqrt((values[:, :, -1] ** 2).mean(axis=0) + values[:, :, :-1].mean(axis=2).var(axis=0))
     size = np.abs(values).max(axis=(0, 2))
     spread[spread <= np.maximum(_CONSTANT * size, _NOTHING * spread.max())] = np.inf
-    center, spread = values.mean(axis=0), spread[:, None]
-    rows = _standard(values, center, spread)
-    width = _width(_squares(rows, rows), references)
-    return Values(center, spread, rows, width) if _SAME < width < np.inf else None
+    return values.mean(axis=0), spread[:, None]
+
+
+def squares_beside_kernels(described: Described) -> tuple[Array, Array]:
+    """Return what tells signals and sensors apart beside the kernels, as in `NearestProfiled`: profiles, and values.
+
+    Shares (k,) of the score and squared distances (k, n, n), 0 where they are rounding; k is 0 of other movements.
+    """
+    if described.values is None:
+        return np.empty(0), np.empty((0, len(described), len(described)))
+    features = convolve(described)[1]
+    profiles = _profiles(features, features.mean(axis=0))
+    values = _standard(described.values, *_center_and_spread(described.values))
+    squares = np.stack([_squares(rows, rows) for rows in (profiles, values)])
+    return np.array([PROFILED, VALUED[0]]), np.where(squares > _SAME**2, squares, 0.0)
 
 
 def fit_best(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> Classifier:
@@ -377,7 +395,7 @@ def fit_best(comparison: Comparison, references: References, groups: NDArray[np.
     logs = comparison.similarity.logs(references.described.take(chosen), references.described)
     groups = comparable_groups(groups)
     by_groups = _left_out(comparison, references, chosen, logs, groups)
-    convolved = convolve(references) if profiled else None
+    convolved = convolve(references.described) if profiled else None
     nearest = NearestEach() if convolved is None else fit_profiled(references, by_groups, convolved)
     if one_each:
         return nearest

@@ -136,9 +136,9 @@ class Convolutions(Classifier):
         return softmax(self.sharpness * scores, axis=1)
 
 
-def convolve(references: References) -> tuple[Kernels, Array]:
-    """Draw kernels for references; return them with the features of the references, (m, f)."""
-    series = series_of(references.described)
+def convolve(described: Described) -> tuple[Kernels, Array]:
+    """Draw kernels for movements; return them with the features of the movements, (n, f)."""
+    series = series_of(described)
     kernels = fit_kernels(series)
     return kernels, transform(series, kernels)
 
@@ -161,7 +161,7 @@ def fit_convolutions(
             f"{len(references.classes)} class(es) in {', '.join(each.name for each in comparison.representations)}; "
             "add movements of another class, or pass classifier='nearest-each'"
         )
-    kernels, features = convolve(references) if convolved is None else convolved
+    kernels, features = convolve(references.described) if convolved is None else convolved
     mean, scale = features.mean(axis=0), features.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     normalized = (features - mean) / scale

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import zip_longest
 from shutil import get_terminal_size
-from statistics import fmean
 from textwrap import fill
 from typing import Any, NamedTuple
 from unicodedata import category, east_asian_width
@@ -31,11 +30,6 @@ class Table(NamedTuple):
     rows: Sequence[tuple[str, ...]]
     reading: str = ""
     pictures: Sequence[str] = ()
-
-
-def mean_and_range(values: Sequence[float]) -> str:
-    """Mean and range over draws, as ``0.954 (0.89-1.00)``."""
-    return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
 
 
 def to_text(table: Table, width: int | None = None) -> str:

@@ -74,11 +74,14 @@ def describe_as(demos: Demonstrations, like: Compares, procrustes: Procrustes) -
 def with_values(
     described: Described, demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
 ) -> Described:
-    """Add the values of movements start:stop where they count: of signals and sensors, which are not rotated."""
-    d = demos.n_dims
-    if d in (2, 3) or described.procrustes.n_points > 1 or not (how.detailed and how.normalization.translation):
-        return described
-    return replace(described, values=recorded_values(demos, start, stop))
+    """Add the values of movements start:stop where they count."""
+    return replace(described, values=recorded_values(demos, start, stop)) if values_count(described, how) else described
+
+
+def values_count(described: Described, how: ComparisonSpecification) -> bool:
+    """Tell whether recorded values count: of signals and sensors, which are not rotated."""
+    is_path = described.n_dims in (2, 3) or described.procrustes.n_points > 1
+    return how.detailed and how.normalization.translation and not is_path
 
 
 def recorded_values(demos: Demonstrations, start: int, stop: int) -> Array:

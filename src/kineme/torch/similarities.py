@@ -97,7 +97,8 @@ def similarity(a: Tensor, b: Tensor, prior: RotationPrior | None = None) -> Tens
             f"expected movements (..., T, d) of equal T and d, got {tuple(a.shape)} and {tuple(b.shape)}"
         )
     d = a.shape[-1]
-    a, b = (_unit(movement - movement.mean(dim=-2, keepdim=True)) for movement in (a, b))
+    a, b = (movement - movement.mean(dim=-2, keepdim=True) for movement in (a, b))
+    a, b = (movement / (movement.square().sum(dim=(-1, -2), keepdim=True) + _SMALL).sqrt() for movement in (a, b))
     M = a.mT @ b
     if d not in (2, 3):
         return M.diagonal(dim1=-2, dim2=-1).sum(-1)
@@ -116,10 +117,6 @@ def _written(matrix: Any, like: Tensor) -> Tensor:
     if like.device.type == "cpu" or torch.compiler.is_compiling():  # compiled, it is a constant of the program
         return torch.as_tensor(matrix, **how)
     return torch.stack([torch.full((), entry, **how) for entry in matrix.ravel().tolist()]).reshape(matrix.shape)
-
-
-def _unit(movement: Tensor) -> Tensor:
-    return movement / (movement.square().sum(dim=(-1, -2), keepdim=True) + _SMALL).sqrt()
 
 
 def _width(kernel: Kernel, width: float | None) -> float:

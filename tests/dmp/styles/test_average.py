@@ -84,8 +84,8 @@ def test_its_spread_is_that_of_the_demonstrations(dmp, demonstrate, agree, seed)
     shares = np.random.default_rng(seed).uniform(0.1, 1, 7)
     mean, weighted = average(learned), average(learned, shares)
     rows = learned.scaled_weights.reshape(7, -1)
-    agree(covariance(mean.weight_factor), np.cov(rows.T), 1e-10)
-    agree(covariance(weighted.weight_factor), np.cov(rows.T, aweights=shares), 1e-10)
+    agree(covariance(mean.factor[:, :, :-3]), np.cov(rows.T), 1e-10)
+    agree(covariance(weighted.factor[:, :, :-3]), np.cov(rows.T, aweights=shares), 1e-10)
     moved = learned.rollout(n_samples=41)
     agree(mean.deviation(41), moved.positions.std(axis=0, ddof=1), 1e-9)
     tau, per_tau = mean.primitive.durations[0], learned.durations[:, None, None]
@@ -99,7 +99,7 @@ def test_many_demonstrations_keep_a_factor_no_taller_than_wide(agree):
     learned = DMP(n_basis=5).learn(x)
     mean = average(learned)
     assert mean.factor.shape == (9, 1, 8)  # d (N + 3) + 1 for the tempo
-    agree(covariance(mean.weight_factor), np.cov(learned.scaled_weights[:, 0].T), 1e-10)
+    agree(covariance(mean.factor[:, :, :-3]), np.cov(learned.scaled_weights[:, 0].T), 1e-10)
 
 
 def test_the_band_holds_as_many_movements_as_gaussian_theory_says(dmp, demonstrate):
@@ -115,7 +115,7 @@ def test_the_band_holds_as_many_movements_as_gaussian_theory_says(dmp, demonstra
 
 def test_the_covariance_of_samples_converges_with_the_root_of_their_number(demonstrate):
     mean = average(DMP(n_basis=10, n_points=60).learn(demonstrate(6, 7)))
-    expected = covariance(mean.weight_factor)
+    expected = covariance(mean.factor[:, :, :-3])
     sizes = np.array([100, 400, 1600, 6400])
     errors = np.zeros(len(sizes))
     for seed in range(8):

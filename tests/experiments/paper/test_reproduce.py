@@ -20,12 +20,13 @@ import pytest
 from click.testing import CliRunner
 
 from kineme.cli import main
-from kineme.reporting.table import mean_and_range, to_text
+from kineme.reporting.table import to_text
 from kineme_experiments.paper import paper
 from kineme_experiments.paper.overview import accuracies, verdict
 from kineme_experiments.paper.representations import READINGS, REPRESENTATIONS
 from kineme_experiments.paper.run import Reproduction, _tasks, arm_tables
 from kineme_experiments.paper.tables import make_tables
+from kineme_experiments.ranges import mean_and_range
 from soaking import SOAK
 
 ARM = all(map(importlib.util.find_spec, ("pinocchio", "pink")))  # the extra robot is installed

@@ -56,11 +56,6 @@ class AveragePrimitive:
     tempo_factor: Array
     noise: float | None = None
 
-    @property
-    def weight_factor(self) -> Array:
-        """F of shape (r, d N), ``F.T @ F`` being the covariance of the scaled weights (dimension-major)."""
-        return self.factor[:, :, :-3].reshape(len(self.factor), -1)
-
     def rollout(  # noqa: PLR0913 - one parameter per option
         self,
         start: ArrayLike | None = None,

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from kineme.library.storage.rows import parsed
@@ -32,15 +29,6 @@ class Source:
     kind: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     read_at: str = ""
-
-    @classmethod
-    def of_file(cls, path: str | Path, kind: str = "", options: Mapping[str, Any] | None = None) -> Source:
-        """Return the source of a file as it is now."""
-        with Path(path).open("rb") as file:
-            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-            size = file.tell()
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        return cls(str(path), sha256, size, kind or Path(path).suffix.lower().lstrip("."), dict(options or {}), now)
 
     @property
     def options_json(self) -> str:

@@ -275,15 +275,11 @@ class Demonstrations(Presented, Sequence[Trajectory]):
 
     def __repr__(self) -> str:
         n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
-        low, high = int(self.lengths.min()), int(self.lengths.max())
-        samples = f"{low}" if low == high else f"{low} to {high}"
-        dims = f"{self.n_dims} dims{_listed(self.dimensions)}"
-        return f"Demonstrations({len(self)} movements, {dims}, {samples} samples each{n_labels})"
-
-
-def _listed(names: tuple[str, ...] | None) -> str:
-    """Names in brackets, of many the first ones."""
-    return f" ({', '.join(names[:_SHOWN])}{', ...' if len(names) > _SHOWN else ''})" if names else ""
+        samples = " to ".join(map(str, sorted({int(self.lengths.min()), int(self.lengths.max())})))
+        names = self.dimensions or ()
+        listed = f" ({', '.join(names[:_SHOWN])}{', ...' if len(names) > _SHOWN else ''})" if names else ""
+        each = f"{self.n_dims} dims{listed}, {samples} samples each{n_labels}"
+        return f"Demonstrations({len(self)} movements, {each})"
 
 
 def _held_by(movements: Any) -> Any:
