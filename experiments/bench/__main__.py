@@ -25,6 +25,7 @@ SUBJECTS = (
     "via_points",
     "joining",
     "recognize",
+    "answers",
     "recognize_files",
     "stream",
     "sensors",

@@ -69,6 +69,7 @@ def recognition() -> dict[Path, dict[str, str]]:
             "lasa": table(*evaluated["shapes"]),
             "open-set": table(*evaluated["unknown"]),
             "strangers": _strangers(),
+            "answers": _answers(),
         },
         "early-and-live": {"stream": _stream()},
     }
@@ -135,6 +136,16 @@ def _strangers() -> str:
         f"{clearly} (`python -m bench --only strangers`)."
     )
     return "\n".join([*lines, "", sentence])
+
+
+def _answers() -> str:
+    """What one label and one whole answer take, beside the rival of each set."""
+    lines = ["| one movement of people | kineme [ms] | rival [ms] | times as fast |", "|---|---|---|---|"]
+    lines += [
+        f"| {row['what']} | {row['ours']:.1f} | {row['peer']:.1f}, {row['peer_name']} | {row['ratio']:.2f} |"
+        for row in rows("answers")
+    ]
+    return "\n".join(lines)
 
 
 def _stream() -> str:

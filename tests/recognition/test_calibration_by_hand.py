@@ -59,7 +59,7 @@ def test_classes_shown_once_reach_three_quarters_of_the_way_to_the_next_and_thos
     impostors = np.array([2.0, 4.0, 9.0, NONE])
     assert typical_distance(impostors) == 4.0
     assert broad_law(np.array(3.0 / typical_scale(impostors))) == pytest.approx(0.05)
-    assert broad_law(np.array(4.0 / typical_scale(impostors, 1.0))) == pytest.approx(0.05)
+    assert broad_law(np.array(4.0 / typical_scale(impostors, np.arange(4)))) == pytest.approx(0.05)
     assert typical_distance(np.array([NONE])) == 3.5
     assert least_scale(np.array([2.0, 4.0, 30.0, NONE])) == pytest.approx(0.4)
     assert least_scale(np.array([NONE])) == 0.0

@@ -7,6 +7,7 @@ Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random Worl
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, overload
@@ -146,11 +147,13 @@ class Calibration:
 
     def p_values(self, nearest: Array, error_rate: float) -> Array:
         """Return p-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
-        scores = self.scores(nearest)
-        result = broad_law(scores)
-        for c, counted in enumerate(self._counting(error_rate)[0]):
-            if counted is not None:
-                result[:, c] = _shares(counted[1], scores[:, c])
+        scores, counting = self.scores(nearest), self._counting(error_rate)[0]
+        result, sharing = broad_law(scores), defaultdict[int, list[int]](list)  # classes share what is pooled
+        for c, counted in enumerate(counting):
+            sharing[0 if counted is None else id(counted[1])].append(c)
+        for columns in sharing.values():
+            if (counted := counting[columns[0]]) is not None:
+                result[:, columns] = _shares(counted[1], scores[:, columns])
         return result
 
     def known_p_values(self, nearest: Array, error_rate: float) -> Array:
@@ -295,7 +298,7 @@ def calibrate(
         away[:, own_class] = np.inf
         others.append(np.minimum.reduceat(away, references.first, axis=1))
     to_others = np.concatenate(impostors)
-    typical = typical_scale(to_others, REACH if groups is None else REACH_OF_OTHERS)
+    typical = typical_scale(to_others, groups)
     by_size = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
     scales = np.array([by_size[int(size)].scales[c] for c, size in enumerate(counts)])
     novelties = {size: _novelties(scored, others, scales) for size, scored in by_size.items()}
@@ -306,7 +309,7 @@ def calibrate(
         [block.nearest(n)[0] * block.shares(n) for block, n in zip(blocks, counts.tolist(), strict=True)]
     )
     away[np.arange(len(away)), nearest_of] = own
-    calibration = Calibration(
+    return Calibration(
         scales,
         tuple(finite(block.nearest(int(n))[0] / s) for block, n, s in zip(blocks, counts, scales, strict=True)),
         tuple(pooled[int(size)] for size in counts),
@@ -314,8 +317,7 @@ def calibrate(
         tuple(novelties[int(size)][0] for size in counts),
         between_classes(to_others, blocks, groups),
         fit_exponent(away[np.isfinite(own)], nearest_of[np.isfinite(own)]),
-    )
-    return calibration.with_least_scales(np.full(len(counts), least_scale(to_others)))
+    ).with_least_scales(np.full(len(counts), least_scale(to_others)))
 
 
 def between_classes(to_others: Array, blocks: Sequence[ClassDistances], groups: NDArray[np.intp] | None) -> float:
@@ -435,9 +437,9 @@ def law(scores: Array) -> Array:
     return np.asarray(np.exp(-y) * terms)
 
 
-def typical_scale(impostors: Array, reach: float = REACH) -> float:
+def typical_scale(impostors: Array, groups: NDArray[np.intp] | None = None) -> float:
     """Return the scale of classes shown once, from distances of demonstrations to the nearest other class."""
-    return reaching(reach * typical_distance(impostors))
+    return reaching((REACH if groups is None else REACH_OF_OTHERS) * typical_distance(impostors))
 
 
 def typical_distance(impostors: Array) -> float:

@@ -13,8 +13,6 @@ from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import (
-    REACH,
-    REACH_OF_OTHERS,
     Calibration,
     ClassDistances,
     between_classes,
@@ -201,7 +199,7 @@ def calibrate_sample(
         windows[c], wholes[c] = window, to_all
     to_others, typical = _impostors(similarity, stored), 0.0
     if not any(np.isfinite(window.distances).any() for window in windows):
-        typical = typical_scale(to_others, REACH if groups is None else REACH_OF_OTHERS)
+        typical = typical_scale(to_others, groups)
     levels = np.where(stored.counts > _SIZES[-1], 0, _SIZES[np.searchsorted(_SIZES, stored.counts, side="right") - 1])
     by_level = {int(s): score_classes(windows if s else wholes, int(s) or most + 1, typical) for s in np.unique(levels)}
     scales = np.array([by_level[int(level)].scales[c] for c, level in enumerate(levels)])
