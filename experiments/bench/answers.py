@@ -18,7 +18,7 @@ from bench.timing import alone, medians
 from kineme_experiments.evaluation.methods import METHODS, Options
 
 N_COPIES, N_MOVING = 11, 21  # of a movement of 21 points, 63 columns
-#: Set -> how many movements one is compared with, and which method that is beside it; accuracy is that of `strangers`.
+#: Set -> how many movements one is compared with, and which method that is beside it.
 ONE_ANSWER = {"words": (400, "plus-cloud"), "gestures in space": (950, "dtw"), "movements of 63 columns": (200, "dtw")}
 
 

@@ -224,10 +224,10 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     """Cluster movements without labels.
 
     By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
-    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fuse`. Profiles and recorded values
-    are among them where `Recognizer` takes these. So movements of several people connect, of whom each repeats the own
-    way more closely than that of others. Name who made each by `groups` where that is known: it is the better the more
-    similar classes are. The other methods take distances ``1 - K`` of the averaged kernel: what is far is just far.
+    together and at the scale of each neighborhood, see `kineme.anchoring.clustering.fuse`; of signals, and of more than
+    three columns that are no points, in profiles and recorded values, too. So movements of several people connect, of
+    whom each repeats the own way more closely than that of others. Name who made each by `groups` where that is known.
+    The other methods take distances ``1 - K`` of the averaged kernel: what is far is just far.
 
     Parameters
     ----------
@@ -252,8 +252,8 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
         Whose representations, invariances and mean to take; it need not be fitted.
     max_clustered : int, optional
         More movements than this are clustered by a subsample of so many; each of the others is added to the cluster of
-        its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
-        default 2000; with the other methods 5000, in space 800.
+        its nearest neighbor in the subsample, by the averaged kernel, if it is within the radius of that cluster, else
+        it is left over. By default 2000; with the other methods 5000, in space 800.
 
     Raises
     ------
@@ -312,8 +312,8 @@ def _by_neighbors(
     described: Described, n_clusters: int | None, min_members: int, people: NDArray[np.intp] | None
 ) -> tuple[clustering.Clusters, Array]:
     """Clusters of movements that are not alone, and how stable each is."""
-    described = by_shape(described)
-    squares = squared_distances(described, described)
+    shape = by_shape(described)
+    squares = squared_distances(shape, shape)
     squares = 0.5 * (squares + squares.transpose(0, 2, 1))
     component = clustering.components(squares)
     large = np.flatnonzero(np.bincount(component)[component] >= min_members)
@@ -321,7 +321,7 @@ def _by_neighbors(
     if len(large) < 3:
         return clusters, np.empty(0)
     shares, others = squares_beside_kernels(described.take(large))
-    own = np.ones(len(squares)) if described.own_weights is None else np.array(described.own_weights)
+    own = np.ones(len(squares)) if shape.own_weights is None else np.array(shape.own_weights)
     weights = np.append((1.0 - shares.sum()) * own / own.sum(), shares)
     squares = np.concatenate((squares[:, large[:, None], large], others))
     similar = clustering.fuse(squares, weights)

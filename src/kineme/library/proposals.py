@@ -108,10 +108,9 @@ def _clustered(
     if classes is not None:
         members = described_as_known(store, ids, classes)
         return assignment.assign_described(members, classes, min_members=min_members).proposals
-    like, people = store.specification.comparison, groups_of(store, ids)
-    members = _with_values(store, ids, described(store, ids), like)
-    how = method or DEFAULT_METHOD
-    return propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
+    members, like, how = described(store, ids), store.specification.comparison, method or DEFAULT_METHOD
+    members = _with_values(store, ids, members, like) if how == DEFAULT_METHOD else members
+    return propose_clusters(members, how, n_clusters, groups=groups_of(store, ids), min_members=min_members, like=like)
 
 
 def _with_values(store: Store, ids: Ids, features: Described, how: ComparisonSpecification) -> Described:

@@ -49,7 +49,8 @@ VALUED = (0.15, 0.05, 0.3, 0.5)
 #: Written words differ; they are right more often than is said.
 _EXPONENT = 8.0
 _LEAST = 1e-9  # of a probability by convolutions
-_NO_PROFILE, _SAME = 1e-9, 1e-3  # length of features that are all as their center; width that is rounding
+_NO_PROFILE = 1e-9  # length of features that are all as their center
+_SAME, _COPIES = 1e-3, 1e-12  # width, and squared distance, that are rounding
 _CONSTANT, _NOTHING = 1e-9, 1e-14  # spread of a column, for its size and for the largest spread, that is rounding
 _ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
@@ -362,9 +363,9 @@ def _center_and_spread(values: Array) -> tuple[Array, Array]:
 
 
 def squares_beside_kernels(described: Described) -> tuple[Array, Array]:
-    """Return what tells signals and sensors apart beside the kernels, as in `NearestProfiled`: profiles, and values.
+    """Return weights (k,) beside the kernels, which have the rest, and squared distances (k, n, n), 0 if rounding.
 
-    Shares (k,) of the score and squared distances (k, n, n), 0 where they are rounding; k is 0 of other movements.
+    Of signals and sensors those of profiles and of values, see `NearestProfiled`; of other movements k is 0.
     """
     if described.values is None:
         return np.empty(0), np.empty((0, len(described), len(described)))
@@ -372,7 +373,7 @@ def squares_beside_kernels(described: Described) -> tuple[Array, Array]:
     profiles = _profiles(features, features.mean(axis=0))
     values = _standard(described.values, *_center_and_spread(described.values))
     squares = np.stack([_squares(rows, rows) for rows in (profiles, values)])
-    return np.array([PROFILED, VALUED[0]]), np.where(squares > _SAME**2, squares, 0.0)
+    return np.array([PROFILED, VALUED[0]]), np.where(squares > _COPIES, squares, 0.0)
 
 
 def fit_best(comparison: Comparison, references: References, groups: NDArray[np.intp] | None = None) -> Classifier:
