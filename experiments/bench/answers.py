@@ -53,10 +53,7 @@ def _beside_rival(name: str, movements: Recorded, quick: bool) -> list[Row]:
 def _of_many_points(gestures: Recorded, n_samples: int = 80) -> Recorded:
     """Twenty kinds of movements of 21 points, each of which makes a gesture, with points that wander a little."""
     rng, u = np.random.default_rng(SEED), np.linspace(0, 1, n_samples)
-    paths = []
-    for demo in gestures.demos:
-        share = (demo.times - demo.times[0]) / np.ptp(demo.times)
-        paths.append(np.stack([np.interp(u, share, x) for x in demo.positions.T], axis=1))
+    paths = kineme.preprocess(gestures.demos, [kineme.Resample(n_samples)]).positions.reshape(-1, n_samples, 3)
     arrays, labels = [], []
     for kind in range(20):
         chosen = rng.choice(len(paths), N_MOVING, replace=False)

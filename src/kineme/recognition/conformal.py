@@ -7,7 +7,6 @@ Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random Worl
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, overload
@@ -147,13 +146,14 @@ class Calibration:
 
     def p_values(self, nearest: Array, error_rate: float) -> Array:
         """Return p-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
-        scores, counting = self.scores(nearest), self._counting(error_rate)[0]
-        result, sharing = broad_law(scores), defaultdict[int, list[int]](list)  # classes share what is pooled
-        for c, counted in enumerate(counting):
-            sharing[0 if counted is None else id(counted[1])].append(c)
-        for columns in sharing.values():
-            if (counted := counting[columns[0]]) is not None:
-                result[:, columns] = _shares(counted[1], scores[:, columns])
+        scores = self.scores(nearest)
+        result = broad_law(scores)
+        sharing: dict[int, tuple[Array, list[int]]] = {}  # classes share what is pooled
+        for c, counted in enumerate(self._counting(error_rate)[0]):
+            if counted is not None:
+                sharing.setdefault(id(counted[1]), (counted[1], []))[1].append(c)
+        for calibrating, columns in sharing.values():
+            result[:, columns] = _shares(calibrating, scores[:, columns])
         return result
 
     def known_p_values(self, nearest: Array, error_rate: float) -> Array:

@@ -80,8 +80,7 @@ def with_values(
 
 def values_count(described: Described, how: ComparisonSpecification) -> bool:
     """Tell whether recorded values count: of signals and sensors, which are not rotated."""
-    is_path = described.n_dims in (2, 3) or described.procrustes.n_points > 1
-    return how.detailed and how.normalization.translation and not is_path
+    return how.detailed and how.normalization.translation and described.procrustes.n_dims not in (2, 3)
 
 
 def recorded_values(demos: Demonstrations, start: int, stop: int) -> Array:

@@ -275,7 +275,8 @@ class Demonstrations(Presented, Sequence[Trajectory]):
 
     def __repr__(self) -> str:
         n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
-        samples = " to ".join(map(str, sorted({int(self.lengths.min()), int(self.lengths.max())})))
+        low, high = int(self.lengths.min()), int(self.lengths.max())
+        samples = low if low == high else f"{low} to {high}"
         names = self.dimensions or ()
         listed = f" ({', '.join(names[:_SHOWN])}{', ...' if len(names) > _SHOWN else ''})" if names else ""
         each = f"{self.n_dims} dims{listed}, {samples} samples each{n_labels}"
