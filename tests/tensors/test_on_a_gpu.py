@@ -135,6 +135,7 @@ def test_the_processor_waits_for_nothing_and_a_graph_repeats_it(gpu, what):
     assert_close(results, expected, 1e-9)
 
 
+@pytest.mark.filterwarnings("ignore")  # the compiler is warned by PyTorch itself
 @pytest.mark.parametrize("what", ["bio-inspired", "original", "actions"])
 def test_what_is_compiled_for_it_is_the_same(gpu, what):
     work, numbers = _results(what, device=gpu), [part.to(gpu) for part in _numbers()]
