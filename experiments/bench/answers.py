@@ -1,4 +1,4 @@
-"""One answer at a time: a label, and a whole answer, beside $P+ and DTW 1-NN.
+"""One answer at a time: a label, an answer, and one with its transform, beside $P+ and DTW 1-NN.
 
 Words and gestures in space are from the folder that KINEME_RECORDINGS names, see `bench.people`. What they are compared
 with is prepared beforehand, of each method; each has one core.
@@ -23,7 +23,7 @@ ONE_ANSWER = {"words": (400, "plus-cloud"), "gestures in space": (950, "dtw"), "
 
 
 def measure(quick: bool) -> list[Row]:
-    """The time of a label, and of a whole answer, to one movement of people among others."""
+    """The time of a label, of an answer, and of one with its transform, to a movement of people among others."""
     words, gestures = recorded("words2d.npz"), recorded("gestures3d.npz")
     if words is None or gestures is None:
         return []
@@ -40,13 +40,19 @@ def _beside_rival(name: str, movements: Recorded, quick: bool) -> list[Row]:
     contender, recognizer = rival.contender(Options(seed=SEED)), kineme.Recognizer().fit(shown)
     contender.fit(shown)
     asked = cycle([movements.demos[order[i : i + 1]] for i in range(n, n + 20)])
-    works = {"a label": recognizer.predict, "the whole answer": recognizer.recognize, "": contender.classify}
+    works = {
+        "a label": recognizer.predict,
+        "an answer": recognizer.recognize,
+        "an answer with its transform": lambda movement: recognizer.recognize(movement)[0].transform,
+        "": contender.classify,
+    }
     timed = {what: alone(lambda work=work: work(next(asked))) for what, work in works.items()}
     seconds = medians(timed, 20 if quick else 200, warm_up=5)
     return [
         Row(f"{what} among {n} {name}", "ms", 1000 * seconds[what], 1000 * seconds[""], rival.title,
             seconds[""] / seconds[what], (">=", 1.0), {"n": n})
-        for what in ("a label", "the whole answer")
+        for what in works
+        if what
     ]  # fmt: skip
 
 

@@ -17,7 +17,7 @@ def test_rows_of_single_precision_are_close_to_those_of_double(choice, scale, mo
     monkeypatch.setenv("KINEME_COMPILED", choice)
     demos = kineme.load_lasa()[::5]
     how = kineme.Recognizer(scale=scale).specification
-    described = describe_tile(demos, 0, len(demos), how, how.procrustes(2)).described
+    described = describe_tile(demos, 0, len(demos), how, how.procrustes(2))
     assert len(described.blocks) == len(how.by_rows)
     for block, rows in zip(described.blocks, feature_rows(demos, how)[: len(how.by_rows)], strict=True):
         assert block.rows.dtype == np.complex64
@@ -29,7 +29,7 @@ def test_movements_far_from_the_origin_keep_the_digits_of_their_forcing_term():
     demos = kineme.load_lasa()[::9]
     far = kineme.Demonstrations.from_arrays([one.positions + 1e5 for one in demos], times=[one.times for one in demos])
     how = kineme.Recognizer(translation=False).specification
-    described = describe_tile(far, 0, len(far), how, how.procrustes(2)).described
+    described = describe_tile(far, 0, len(far), how, how.procrustes(2))
     for block, rows in zip(described.blocks, feature_rows(far, how), strict=True):
         assert np.array_equal(block.rows, as_complex(rows.astype(np.float32)))
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, cast
 
@@ -15,17 +15,17 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import MovementLike, MovementsLike, Trajectory
-from kineme.recognition import explanation
 from kineme.recognition.classifiers import BY_CONVOLUTIONS, KERNELS, NearestEach, fit_classifier
 from kineme.recognition.conformal import GUESSES, RULES, Calibration, calibrate, check_error_rate, class_probabilities
+from kineme.recognition.explanation import Explanation, Matches, Rationale, Transform, explain
 from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, data_frame, to_html
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, IndexedMovements, References, fit_comparison
-from kineme.similarity.describe import Described, Tile, even_paths, fit_maps, recorded_paths
+from kineme.similarity.describe import Described
 from kineme.similarity.scores import Classifier, Compared, for_compared, score
 from kineme.similarity.similarity import AveragedSimilarity
-from kineme.similarity.specification import POSITIONS, ComparisonSpecification
+from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class Answer:
     nearest : tuple of Neighbor
         Up to three demonstrations of the answered class, or, if unknown, of the best-ranked one; nearest first.
     transform : Transform
-        Maps the first of them onto the movement.
+        Maps the first of them onto the movement; computed when it is first asked for.
     responsibilities : mapping from str to float
         Share of each representation in the similarity to the first of them; they sum to 1.
     """
@@ -111,9 +111,14 @@ class Answer:
     calibrated: bool
     ranked: tuple[Label, ...]
     nearest: tuple[Neighbor, ...]
-    transform: Transform
     responsibilities: Mapping[str, float]
-    _rests_on: explanation.Rationale | None = field(default=None, repr=False)
+    _rests_on: Rationale | None = field(default=None, repr=False)
+
+    @cached_property
+    def transform(self) -> Transform:
+        """Map from the first of `nearest` onto the movement; computed when it is first asked for."""
+        rests_on = self._movements()
+        return rests_on.matches.transforms[rests_on.row]
 
     @property
     def promise(self) -> str:
@@ -203,7 +208,7 @@ class Answer:
         row["duration_ratio"] = self.transform.duration_ratio
         return data_frame({name: [value] for name, value in row.items()})
 
-    def explain(self) -> explanation.Explanation:
+    def explain(self) -> Explanation:
         """Explain the answer: the movement over its nearest example, where they differ, and the runner-up.
 
         ``answer.explain().plot()`` draws it, and ``answer.explain().in_words`` says it in a sentence.
@@ -213,15 +218,18 @@ class Answer:
         SpecificationError
             An answer that was sent to another process: it leaves the movements behind.
         """
+        return explain(self._movements(), self.in_words, dict(self.responsibilities))
+
+    def _movements(self) -> Rationale:
         if self._rests_on is None:
             raise SpecificationError(
                 "expected an answer as it was given, got one that was sent to another process without its movements; "
                 "recognize the movement again and explain that answer"
             )
-        return explanation.explain(self._rests_on, self.in_words, dict(self.responsibilities))
+        return self._rests_on
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_rests_on": None}
+        return vars(self) | {"transform": self.transform, "_rests_on": None}
 
     def plot(self, movement: MovementLike | None = None, demonstrations: MovementsLike | None = None) -> Figure:
         """Draw the probabilities of the first ten classes, and the share of each representation in the similarity.
@@ -256,10 +264,10 @@ class Answer:
         rows = [(str(label), f"{self.probabilities[label]:.2f}") for label in shown]
         pictures = []
         if self._rests_on is not None:
-            _, references, movement, examples, _ = self._rests_on
-            nearest = references[np.array([index for _, index, _ in examples], dtype=np.intp)]
+            matches, row, examples, _ = self._rests_on
+            nearest = matches.references[np.array([index for _, index, _ in examples], dtype=np.intp)]
             drawn = {label: thumbnail(stored.positions) for (label, *_), stored in zip(examples, nearest, strict=True)}
-            pictures = [thumbnail(movement.positions), *(drawn.get(label, "") for label in shown)]
+            pictures = [thumbnail(matches.movements[row].positions), *(drawn.get(label, "") for label in shown)]
             rows.insert(0, ("the movement", ""))
         return to_html(Table(self.in_words, ("class", "probability, if it is known"), rows, self.promise, pictures))
 
@@ -289,7 +297,7 @@ def known_labels(
 
 
 class Verdict(NamedTuple):
-    """An `Answer` without its transform, and the `shares` (R,) of the representations."""
+    """An `Answer` without its movements, and the `shares` (R,) of the representations."""
 
     label: Label | None
     confidence: float
@@ -302,7 +310,7 @@ class Verdict(NamedTuple):
     nearest: tuple[Neighbor, ...]
     responsibilities: Mapping[str, float]
     shares: Array
-    examples: tuple[tuple[Label, int, float], ...]  # of `explanation.Rationale`
+    examples: tuple[tuple[Label, int, float], ...]  # of `Rationale`
     by_convolutions: bool
 
 
@@ -359,24 +367,19 @@ def verdicts_of(
     ]
 
 
-def with_transforms(
-    verdicts: Sequence[Verdict],
-    comparison: Comparison,
-    references: IndexedMovements,
-    demos: Demonstrations,
-    paths: Array,
+def answers_of(
+    verdicts: Sequence[Verdict], comparison: Comparison, references: IndexedMovements, demos: Demonstrations
 ) -> list[Answer]:
-    """Return the answers to movements: with the transforms from those of the references that they are most like."""
+    """Return the answers to movements, which keep the movements and the references that these are most like."""
     example = np.array([verdict.nearest[0].index for verdict in verdicts], dtype=np.intp)
     share = np.stack([verdict.shares for verdict in verdicts], axis=1)
-    transforms = map_onto(comparison, references, example, demos, paths, share)
+    matches = Matches(comparison, references, demos, example, share)
     given = []
-    for i, (verdict, transform) in enumerate(zip(verdicts, transforms, strict=True)):
+    for row, verdict in enumerate(verdicts):
         fields = verdict._asdict()
         del fields["shares"]
-        movement, by_convolutions = demos[i : i + 1], fields.pop("by_convolutions")
-        rests_on = explanation.Rationale(comparison, references, movement, fields.pop("examples"), by_convolutions)
-        given.append(Answer(**fields, transform=transform, _rests_on=rests_on))
+        rests_on = Rationale(matches, row, fields.pop("examples"), fields.pop("by_convolutions"))
+        given.append(Answer(**fields, _rests_on=rests_on))
     return given
 
 
@@ -439,11 +442,10 @@ class KnownClasses:
         demos = comparison.checked(movements)
         parts: dict[int, list[Answer]] = {}
 
-        def answer(tile: Tile, compared: Compared) -> None:
-            some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
-            paths = recorded_paths(some, tile.paths)
+        def answer(rows: slice, compared: Compared) -> None:
+            some = demos if len(compared) == len(demos) else demos[rows]
             verdicts = verdicts_of(compared, self.classifier, self.calibration, error_rate)
-            parts[tile.start] = with_transforms(verdicts, comparison, references.demonstrations, some, paths)
+            parts[rows.start] = answers_of(verdicts, comparison, references.demonstrations, some)
 
         for_compared(comparison, references, demos, answer)
         return [each for start in sorted(parts) for each in parts[start]]
@@ -490,70 +492,3 @@ def fit_known_classes(
 def open_set_labels(classes: KnownClasses, described: Described, error_rate: float) -> tuple[NDArray[Any], Array]:
     """Return `KnownClasses.labels` by those who showed some."""
     return replace(classes, calibration=classes.calibration.of_those_shown()).labels(described, error_rate)
-
-
-@dataclass(frozen=True, eq=False)
-class Transform:
-    """``x = matrix @ x_demonstration + shift``, and a time that runs `duration_ratio` as long.
-
-    With sizes of both per dimension, ``matrix = diag(size) R diag(1 / size_demonstration)``; with one size for all
-    dimensions, ``matrix = scale R``. What the recognizer does not take out stays 0, or 1, here.
-    """
-
-    matrix: Array  # (d, d)
-    shift: Array  # (d,)
-    scale: Array  # (d,), equal numbers unless sizes are per dimension
-    rotation: Array  # (d, d), R: of points that turn together the rotation of each along the diagonal
-    duration_ratio: float
-    n_points: int = 1
-
-    @property
-    def angle(self) -> float:
-        """Angle of the rotation [rad], of points their common one; with a sign in the plane, counterclockwise positive.
-
-        0 for columns that are not rotated.
-        """
-        d = len(self.rotation) // self.n_points
-        R = self.rotation[:d, :d]
-        if d == 2:
-            return math.atan2(R[1, 0], R[0, 0])
-        if d != 3:
-            return 0.0
-        return math.atan2(float(np.linalg.norm(R - R.T)) / math.sqrt(2.0), float(np.trace(R)) - 1.0)
-
-    def apply(self, positions: Array) -> Array:
-        """Return positions (T, d) of the demonstration, mapped."""
-        return np.asarray(positions) @ self.matrix.T + self.shift
-
-
-def map_onto(
-    comparison: Comparison,
-    references: IndexedMovements,
-    example: NDArray[np.intp],
-    demos: Demonstrations,
-    paths: Array,
-    share: Array,
-) -> list[Transform]:
-    """Return transforms from the references `example` (n,) onto as many movements.
-
-    Fitted to positions over the phase of the representation with the largest share (R, n), one batch for each phase.
-
-    `demos`: the movements; `paths` (n, d, T): of the movements, where they were recorded.
-    """
-    # Of two representations that are equally alike, the one with the larger weight has the larger share.
-    weights = comparison.similarity.weights
-    alike = share if weights is None else share / np.maximum(weights, np.finfo(float).tiny)[:, None]
-    phases = np.array([representation.arc_share for representation in comparison.representations])[alike.argmax(axis=0)]
-    used, which = np.unique(example, return_inverse=True)  # one example may be that of many
-    stored = references[used]
-    examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]
-    ratios = (demos.durations / stored.durations[which]).tolist()
-    transforms: dict[int, Transform] = {}
-    for phase in np.unique(phases):
-        chosen = np.flatnonzero(phases == phase)
-        positions = replace(POSITIONS, arc_share=float(phase))
-        ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
-        maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
-        for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):
-            transforms[i] = Transform(matrix, shift, scale, rotation, ratios[i], comparison.procrustes.n_points)
-    return [transforms[i] for i in range(len(demos))]

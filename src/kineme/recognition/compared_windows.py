@@ -28,7 +28,6 @@ from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.describe import Tile
 from kineme.similarity.scores import Compared, for_compared, nearest_above
 from kineme.validation import Array
 
@@ -230,7 +229,7 @@ def _scores(
     def fill(begin: int, first: int, last: int) -> None:
         tile = slice(begin + first, begin + last)
 
-        def compare(part: Tile, compared: Compared) -> None:
+        def compare(part: slice, compared: Compared) -> None:
             own = slice(tile.start + part.start, tile.start + part.stop)
             described, known = compared.described, references.described
             logs[own] = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -148,11 +148,7 @@ class Calibration:
         """Return p-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
         scores = self.scores(nearest)
         result = broad_law(scores)
-        sharing: dict[int, tuple[Array, list[int]]] = {}  # classes share what is pooled
-        for c, counted in enumerate(self._counting(error_rate)[0]):
-            if counted is not None:
-                sharing.setdefault(id(counted[1]), (counted[1], []))[1].append(c)
-        for calibrating, columns in sharing.values():
+        for calibrating, columns in self._counting(error_rate).sharing:
             result[:, columns] = _shares(calibrating, scores[:, columns])
         return result
 
@@ -165,7 +161,7 @@ class Calibration:
         like = scores.argmin(axis=1)
         novelty = scores[np.arange(len(scores)), like]
         result = np.empty(len(scores))
-        counted = self._counting(error_rate)[1]
+        counted = self._counting(error_rate).novelties
         for c in np.unique(like):
             own, chosen, few = novelty[like == c], counted[c], self.pooled_novelties[c]
             if chosen is not None:
@@ -186,7 +182,7 @@ class Calibration:
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
         """Name the rule of each movement's `known_p_values`: "class", "pooled", "strangers" or "guess", see `RULES`."""
-        counted = self._counting(error_rate)[1]
+        counted = self._counting(error_rate).novelties
         chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
         by_strangers = (self._by_those_shown(nearest, error_rate) <= error_rate) & (
             self._by_strangers(nearest) > error_rate
@@ -201,7 +197,7 @@ class Calibration:
 
         They keep it where at least ``1 / error_rate - 1`` left-out scores count. One demonstration has none.
         """
-        return np.array([counted is not None for counted in self._counting(error_rate)[0]])
+        return np.array([counted is not None for counted in self._counting(error_rate).members])
 
     def with_least_scales(self, least: Array) -> Calibration:
         """Raise scales to at least (C,); where that is more, a demonstration is as novel as that makes it: 1."""
@@ -232,17 +228,30 @@ class Calibration:
         of_some: dict[str, Any] = {name: tuple(getattr(self, name)[c] for c in classes) for name in parts}
         return replace(self, scales=self.scales[classes], **of_some)
 
-    def _counting(self, error_rate: float) -> tuple[list[Counted | None], list[Counted | None]]:
-        """Return what counts of the scores and of the novelties; stored for the last error rate."""
+    def _counting(self, error_rate: float) -> Counting:
+        """Return what counts; stored for the last error rate."""
         last = vars(self).get("_last_counting")
         if last is None or last[0] != error_rate:
             members = _counted(self.own, self.pooled, error_rate)
-            last = error_rate, members, _counted(self.own_novelties, self.pooled_novelties, error_rate)
+            sharing: dict[int, tuple[Array, list[int]]] = {}  # classes share what is pooled
+            for c, counted in enumerate(members):
+                if counted is not None:
+                    sharing.setdefault(id(counted[1]), (counted[1], []))[1].append(c)
+            novelties = _counted(self.own_novelties, self.pooled_novelties, error_rate)
+            last = error_rate, Counting(members, novelties, list(sharing.values()))
             vars(self)["_last_counting"] = last
-        return last[1], last[2]
+        return last[1]
 
 
 Counted = tuple[str, Array]  # a rule, and scores in rising order
+
+
+class Counting(NamedTuple):
+    """What counts at an error rate: for each class of the scores and of the novelties, None where too few do."""
+
+    members: list[Counted | None]
+    novelties: list[Counted | None]
+    sharing: list[tuple[Array, list[int]]]  # scores in rising order, and the classes of which they count
 
 
 def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[Counted | None]:

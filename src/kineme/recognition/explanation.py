@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.movements.channels.detect import point_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -183,27 +186,97 @@ class Explanation:
         return inline(self.plot(), self.in_words)
 
 
-class Rationale(NamedTuple):
-    """What an answer rests on: the movement, and the examples that it is most like."""
+@dataclass(frozen=True, eq=False)
+class Transform:
+    """``x = matrix @ x_demonstration + shift``, and a time that runs `duration_ratio` as long.
+
+    With sizes of both per dimension, ``matrix = diag(size) R diag(1 / size_demonstration)``; with one size for all
+    dimensions, ``matrix = scale R``. What the recognizer does not take out stays 0, or 1, here.
+    """
+
+    matrix: Array  # (d, d)
+    shift: Array  # (d,)
+    scale: Array  # (d,), equal numbers unless sizes are per dimension
+    rotation: Array  # (d, d), R: of points that turn together the rotation of each along the diagonal
+    duration_ratio: float
+    n_points: int = 1
+
+    @property
+    def angle(self) -> float:
+        """Angle of the rotation [rad], of points their common one; with a sign in the plane, counterclockwise positive.
+
+        0 for columns that are not rotated.
+        """
+        d = len(self.rotation) // self.n_points
+        R = self.rotation[:d, :d]
+        if d == 2:
+            return math.atan2(R[1, 0], R[0, 0])
+        if d != 3:
+            return 0.0
+        return math.atan2(float(np.linalg.norm(R - R.T)) / math.sqrt(2.0), float(np.trace(R)) - 1.0)
+
+    def apply(self, positions: Array) -> Array:
+        """Return positions (T, d) of the demonstration, mapped."""
+        return np.asarray(positions) @ self.matrix.T + self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Movements that were recognized together, and the reference that each is most like."""
 
     comparison: Comparison
     references: IndexedMovements
-    movement: Demonstrations  # one
+    movements: Demonstrations  # n
+    examples: NDArray[np.intp]  # (n,), which references
+    shares: Array  # (R, n), of the representations in these similarities
+
+    @cached_property
+    def transforms(self) -> list[Transform]:
+        """Transforms from the references onto the movements, fitted when the first is asked for.
+
+        Fitted to positions over the phase of the representation with the largest share, one batch for each phase.
+        """
+        comparison, demos = self.comparison, self.movements
+        # Of two representations that are equally alike, the one with the larger weight has the larger share.
+        weights = comparison.similarity.weights
+        alike = self.shares if weights is None else self.shares / np.maximum(weights, np.finfo(float).tiny)[:, None]
+        phases = np.array([each.arc_share for each in comparison.representations])[alike.argmax(axis=0)]
+        used, which = np.unique(self.examples, return_inverse=True)  # one example may be that of many
+        stored = self.references[used]
+        examples, paths = _smooth(stored, comparison.cutoff)[which], _smooth(demos, comparison.cutoff)
+        ratios = (demos.durations / stored.durations[which]).tolist()
+        transforms: dict[int, Transform] = {}
+        for phase in np.unique(phases):
+            chosen = np.flatnonzero(phases == phase)
+            positions = replace(POSITIONS, arc_share=float(phase))
+            ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
+            maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
+            for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):
+                transforms[i] = Transform(matrix, shift, scale, rotation, ratios[i], comparison.procrustes.n_points)
+        return [transforms[i] for i in range(len(demos))]
+
+
+class Rationale(NamedTuple):
+    """What an answer rests on: one of the movements, and the examples that it is most like."""
+
+    matches: Matches
+    row: int
     examples: tuple[tuple[Label, int, float], ...]  # label, index and similarity: the nearest, and the runner-up
     by_convolutions: bool
 
 
 def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Explanation:
     """Lay the examples over the movement."""
-    comparison = rationale.comparison
+    comparison, row = rationale.matches.comparison, rationale.row
+    movement, cutoff = rationale.matches.movements[row : row + 1], comparison.specification.detailed_cutoff
     rows = np.array([index for _, index, _ in rationale.examples], dtype=np.intp)
     used, which = np.unique(rows, return_inverse=True)
-    stored = rationale.references[used]
-    target, examples = (_ALONG.along(_smooth(movements, comparison)) for movements in (rationale.movement, stored))
+    stored = rationale.matches.references[used]
+    target, examples = (_ALONG.along(_smooth(movements, cutoff)) for movements in (movement, stored))
     examples = examples[which]
     mapped = fit_maps(examples, target, comparison.normalization, comparison.procrustes).move(examples)
-    path, columns = np.ascontiguousarray(target[0].T), rationale.movement._samples.axis_names
-    parts, overlays = _parts(rationale, columns), []
+    path, columns = np.ascontiguousarray(target[0].T), movement._samples.axis_names
+    parts, overlays = _parts(comparison, movement, columns), []
     for (label, _, similarity), moved in zip(rationale.examples, mapped, strict=True):
         example = np.ascontiguousarray(moved.T)
         squares = by_part(path, example, parts) ** 2
@@ -214,12 +287,12 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     return Explanation(answer, path, columns, parts, overlays[0], runner_up, shares, rationale.by_convolutions)
 
 
-def _parts(rationale: Rationale, columns: tuple[str, ...]) -> tuple[Part, ...]:
+def _parts(comparison: Comparison, movement: Demonstrations, columns: tuple[str, ...]) -> tuple[Part, ...]:
     """Return the points of the movement; its columns where these are none in the plane or in space."""
-    n, d = rationale.comparison.procrustes.n_points, rationale.comparison.procrustes.n_dims
+    n, d = comparison.procrustes.n_points, comparison.procrustes.n_dims
     if d not in (2, 3):
         return tuple(Part(name, (k,)) for k, name in enumerate(columns))
-    names = point_names(rationale.movement.channels)
+    names = point_names(movement.channels)
     names = names if len(names) == n else tuple(f"point {k + 1}" for k in range(n))
     return tuple(Part(name, tuple(range(k * d, (k + 1) * d))) for k, name in enumerate(names))
 
@@ -230,7 +303,6 @@ def by_part(path: Array, example: Array, parts: tuple[Part, ...]) -> Array:
     return np.stack([np.linalg.norm((example - path)[:, part.columns], axis=1) for part in parts]) / size
 
 
-def _smooth(movements: Demonstrations, comparison: Comparison) -> Array:
-    """Return paths (n, d, T) where they were recorded, smoothed as for comparison in detail."""
-    cutoff = comparison.specification.detailed_cutoff
+def _smooth(movements: Demonstrations, cutoff: float | None) -> Array:
+    """Return paths (n, d, T) where they were recorded, smoothed as for comparison."""
     return recorded_paths(movements, even_paths(movements, 0, len(movements), cutoff))

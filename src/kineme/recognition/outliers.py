@@ -19,7 +19,7 @@ from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, printable
 from kineme.sampling import evenly_spaced
 from kineme.similarity.comparison import Comparison, References, fit_comparison
-from kineme.similarity.describe import Described, Tile, for_described
+from kineme.similarity.describe import Described, for_described
 from kineme.similarity.specification import ComparisonSpecification
 from kineme.validation import Array
 
@@ -206,13 +206,12 @@ def _distances(
     near, far = np.empty(len(rows)), np.full(len(rows), np.inf)
     k = min(_NEAREST, len(compared) - 1)
 
-    def fill(tile: Tile) -> None:
-        chosen = slice(tile.start, tile.stop)
-        away = distances(comparison.similarity.log_average(tile.described, own))
-        away[np.arange(tile.start, tile.stop)[:, None] == compared] = np.inf
+    def fill(chosen: slice, described: Described) -> None:
+        away = distances(comparison.similarity.log_average(described, own))
+        away[np.arange(chosen.start, chosen.stop)[:, None] == compared] = np.inf
         near[chosen] = np.partition(away, k - 1, axis=1)[:, :k].mean(axis=1)
         if len(foreign):
-            far[chosen] = distances(comparison.similarity.log_average(tile.described, foreign)).min(axis=1)
+            far[chosen] = distances(comparison.similarity.log_average(described, foreign)).min(axis=1)
 
     for_described(demos[rows], comparison, comparison.procrustes, fill, _COMPARED)
     return near, far

@@ -22,7 +22,7 @@ from kineme.reporting.table import to_html
 from kineme.reporting.text import in_markup
 from kineme.runtime.compiled import load_compiled
 from kineme.similarity.comparison import Comparison, References, fit_comparison
-from kineme.similarity.describe import Described, Tile
+from kineme.similarity.describe import Described
 from kineme.similarity.scores import Compared, Score, for_compared, score
 from kineme.similarity.specification import (
     ComparisonSpecification,
@@ -267,8 +267,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         demos = comparison.checked(X)
         best = np.empty(len(demos), np.intp)
 
-        def fill(tile: Tile, compared: Compared) -> None:
-            best[tile.start : tile.stop] = self.classifier_.best(compared)
+        def fill(rows: slice, compared: Compared) -> None:
+            best[rows] = self.classifier_.best(compared)
 
         for_compared(comparison, references, demos, fill)
         return np.asarray(references.classes[best])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.trajectories.trajectory import MovementsLike
-from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
+from kineme.recognition.answer import Answer, Verdict, answers_of, verdicts_of
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import (
     Calibration,
@@ -28,7 +28,7 @@ from kineme.runtime.parallel import single_threaded_blas
 from kineme.sampling import evenly_spaced
 from kineme.similarity.bounds import ReducedFeatures, Single, log_bounds, reduce_features
 from kineme.similarity.comparison import Comparison, HeldReferences, OnDemand, References, Rows, StoredReferences
-from kineme.similarity.describe import Described, describe_tile, recorded_paths
+from kineme.similarity.describe import Described, describe_tile
 from kineme.similarity.scores import Compared
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS
@@ -83,11 +83,12 @@ class TwoStageSearch:
         step = max(_ASKED, min(_MOST_ASKED, _BOUNDS // len(self.stored.members)))
         for start in range(0, len(demos), step):
             some = demos[start : start + step] if len(demos) > step else demos
-            tile = describe_tile(some, 0, len(some), self.comparison, self.comparison.procrustes)
+            described = describe_tile(some, 0, len(some), self.comparison, self.comparison.procrustes)
             with single_threaded_blas():  # held once, not for each of many small products
-                verdicts = self._verdicts(tile.described, held, error_rate)
+                verdicts = self._verdicts(described, held, error_rate)
             every = OnDemand(np.arange(held.n_rows), self.stored.movements)
-            answers += with_transforms(verdicts, self.comparison, every, some, recorded_paths(some, tile.paths))
+            answers += answers_of(verdicts, self.comparison, every, some)
+            _ = answers[-1].transform  # of all of these, while what is stored can still be read
         return answers
 
     def _verdicts(self, described: Described, held: HeldReferences, error_rate: float) -> list[Verdict]:

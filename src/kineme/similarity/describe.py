@@ -174,43 +174,38 @@ def feature_rows(movements: MovementsLike, specification: ComparisonSpecificatio
     )
 
     def fill(start: int, stop: int) -> None:
-        for block, tile in zip(rows, _tile_rows(demos, start, stop, specification, np.float64)[1], strict=True):
+        for block, tile in zip(rows, _tile_rows(demos, start, stop, specification, np.float64), strict=True):
             block[start:stop] = tile
 
     for_tiles(fill, len(demos), _tile_movements(demos.n_dims))
     return rows
 
 
-class Tile(NamedTuple):
-    """Movements start:stop of many, described; `paths` (n, d, T) are as `even_paths` gives them."""
-
-    start: int
-    stop: int
-    paths: Array
-    described: Described
-
-
 def for_described(
-    demos: Demonstrations, like: Compares, procrustes: Procrustes, work: Callable[[Tile], None], most: int | None = None
+    demos: Demonstrations,
+    like: Compares,
+    procrustes: Procrustes,
+    work: Callable[[slice, Described], None],
+    most: int | None = None,
 ) -> None:
-    """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
+    """Describe movements tile by tile, in threads, and call `work` with the rows of each, at most `most` movements.
 
     So that the rows of a movement are compared while they are in the core's cache.
     """
     how = like.specification
 
     def one_tile(start: int, stop: int) -> None:
-        work(describe_tile(demos, start, stop, how, procrustes))
+        work(slice(start, stop), describe_tile(demos, start, stop, how, procrustes))
 
     step = _tile_movements(demos.n_dims)
     for_tiles(one_tile, len(demos), step if most is None else min(step, most))
 
 
-def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, procrustes: Procrustes) -> Tile:
+def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, procrustes: Procrustes) -> Described:
     """Describe movements start:stop, all at once."""
     how = like.specification
-    paths, rows = _tile_rows(demos, start, stop, how, _precision(how))
-    return Tile(start, stop, paths, with_values(prepare(rows, like, procrustes), demos, start, stop, how))
+    rows = _tile_rows(demos, start, stop, how, _precision(how))
+    return with_values(prepare(rows, like, procrustes), demos, start, stop, how)
 
 
 def describe_paths(paths: Array, details: Array, like: Compares, procrustes: Procrustes) -> Described:
@@ -269,13 +264,12 @@ def recorded_paths(demos: Demonstrations, paths: Array, start: int = 0) -> Array
 
 def _tile_rows(
     demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification, dtype: DTypeLike
-) -> tuple[Array, tuple[NDArray[Any], ...]]:
-    """Return paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
-    relative, details = detailed_paths(demos, start, stop, how)
-    if how.normalization.translation:
-        return relative, _path_rows(relative, details, how, dtype)
-    placed, placed_details = (recorded_paths(demos, paths, start) for paths in (relative, details))
-    return relative, _path_rows(placed, placed_details, how, dtype)
+) -> tuple[NDArray[Any], ...]:
+    """Return feature rows of movements start:stop as `dtype`."""
+    paths, details = detailed_paths(demos, start, stop, how)
+    if not how.normalization.translation:
+        paths, details = (recorded_paths(demos, relative, start) for relative in (paths, details))
+    return _path_rows(paths, details, how, dtype)
 
 
 def _path_rows(

@@ -24,7 +24,7 @@ from kineme.kernels.pair_distances import listed_distances, pair_bounds
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import for_tiles
 from kineme.similarity.comparison import Comparison, References
-from kineme.similarity.describe import Described, Pairs, Tile, fill_by_rows, for_described, measure_pairs
+from kineme.similarity.describe import Described, Pairs, fill_by_rows, for_described, measure_pairs
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import LOG_MEANS, PAIR_QUANTITIES, SHARES
 from kineme.validation import Array
@@ -125,31 +125,31 @@ def score(
     """Return scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
     arrays = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
 
-    def fill(start: int, compared: Compared) -> None:
+    def fill(rows: slice, compared: Compared) -> None:
         for array, by in zip(arrays, scores, strict=True):
-            array[start : start + len(compared)] = by(compared)
+            array[rows] = by(compared)
 
     if isinstance(movements, Described):
         described = movements
         for_tiles(
-            lambda a, b: fill(a, Compared(comparison, references, described.take(slice(a, b)))),
+            lambda a, b: fill(slice(a, b), Compared(comparison, references, described.take(slice(a, b)))),
             len(described),
             tile_rows(references),
         )
     else:
-        for_compared(comparison, references, movements, lambda tile, compared: fill(tile.start, compared))
+        for_compared(comparison, references, movements, fill)
     return arrays
 
 
 def for_compared(
-    comparison: Comparison, references: References, demos: Demonstrations, work: Callable[[Tile, Compared], None]
+    comparison: Comparison, references: References, demos: Demonstrations, work: Callable[[slice, Compared], None]
 ) -> None:
     """Describe movements tile by tile, in threads, and hand each tile on with its comparison."""
     for_described(
         demos,
         comparison,
         comparison.procrustes,
-        lambda tile: work(tile, Compared(comparison, references, tile.described)),
+        lambda rows, described: work(rows, Compared(comparison, references, described)),
         tile_rows(references),
     )
 
