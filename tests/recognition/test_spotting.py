@@ -426,6 +426,21 @@ def test_it_is_fitted_first():
         Recognizer().spot(np.zeros((20, 2)))
 
 
+@pytest.mark.parametrize("gap", [0.6, 60.0, 3600.0])
+def test_a_rest_may_have_no_samples_however_long_it_is(gap):
+    """A pen that is lifted sends nothing, and one pause says nothing of how fast the others move."""
+    recording, truth = _stream(0, KNOWN)
+    moving = _frames(truth, recording.times) != ""
+    later = np.where(recording.times > truth[1][1] + 0.3, gap, 0.0)
+    found = _recognizer().spot(Trajectory((recording.times + later)[moving], recording.positions[moving]))
+    assert [one.label for one in found if one.label is not None] == KNOWN
+    np.testing.assert_allclose(
+        [(one.start, one.end) for one in found if one.label is not None],
+        [(start + gap * (k > 1), end + gap * (k > 1)) for k, (start, end, _) in enumerate(truth)],
+        atol=0.4,
+    )
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
 @pytest.mark.parametrize("rest", [0, 50])
 def test_a_robot_that_repeats_its_movements_exactly_is_recognized(noise, rest):

@@ -34,6 +34,18 @@ def test_unit_place_and_tempo_do_not_matter(make_recording, by, seed, unit, temp
     np.testing.assert_allclose(kineme.segment(one, by).rows, kineme.segment(other, by).rows, atol=1)  # rounding
 
 
+@pytest.mark.parametrize("by", ["rest", "speed"])  # change points need samples of each regime
+@given(seed=seeds, pause=st.sampled_from([0.6, 60.0, 3600.0]), noise=st.sampled_from([0.0, 0.003]))
+def test_a_pause_of_any_length_may_have_no_samples(make_recording, by, seed, pause, noise):
+    known = make_recording(seed, n=3, noise=noise)
+    t, x = known.recording.times, known.recording.positions
+    moving = np.any([(start - 0.05 <= t) & (t <= end + 0.05) for start, end in known.truth], axis=0)
+    later = np.where(t > known.truth[0, 1] + 0.2, pause, 0.0)
+    found = kineme.segment(Trajectory((t + later)[moving], x[moving]), by)
+    expected = known.truth + [[0.0], [pause], [pause]]
+    np.testing.assert_allclose(found.cuts, expected, atol=0.2)
+
+
 @methods
 @given(seed=seeds, noise=st.sampled_from([0.0, 0.01]))
 def test_cover_loses_and_duplicates_no_sample(make_recording, by, seed, noise):

@@ -86,7 +86,7 @@ def test_an_onset_is_extrapolated_by_a_tenth_of_the_movement_at_most():
     """Speed that creeps from a twentieth to a fifth of its peak for four seconds began at most 0.5 s before."""
     t = np.arange(0.0, 10.0, 0.01)
     speed = np.interp(t, [0.0, 4.9, 5.0, 9.0, 9.5, 10.0], [0.04, 0.0499, 0.05, 0.2, 1.0, 1.0])
-    motion = Motion(t, t[:, None], speed, 1.0, 0.0, 1e6, np.empty((len(t), 0)))
+    motion = Motion(t, t, t[:, None], speed, 1.0, 0.0, 1e6, np.empty((len(t), 0)))
     start = t[onset_rows(motion, np.array([[0, len(t)]]))[0, 0]]
     assert start == pytest.approx(5.0 - 0.1 * (t[-1] - 5.0), abs=0.02)
 

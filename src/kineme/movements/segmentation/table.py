@@ -34,6 +34,7 @@ _PEAK_PATH = 0.9  # of the path is covered below the peak speed
 _MIN_SAMPLES = 8  # two movements of four samples
 _GLITCH = 3  # samples, at most: what leaves the path for longer is a movement
 _GLITCH_STEPS = 10.0  # distance of a glitch from the path, in the longest steps of the path beside it, at least
+_GAP = 10.0  # typical steps, at most, that pass on the clock between two samples
 _NOISE_EXTENTS = 4.0  # a smoothed recording rests if its extent is less than this many standard deviations of noise
 
 _MIN_REST, _MIN_BETWEEN = 0.035, 0.1  # of the typical duration of a movement
@@ -159,7 +160,7 @@ class SpeedMinima:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
         from scipy.signal import find_peaks  # it takes long to load, and most commands cut nothing
 
-        t = motion.times - motion.times[0]
+        t = motion.clock
         even = np.linspace(0.0, t[-1], len(t))
         slowness = np.interp(even, t, -np.log(motion.speed + max(_FLOOR * motion.peak, 2.0 * motion.noise)))
         least = -np.log(self.depth)
@@ -255,9 +256,9 @@ class ChangePoints:
 
     def inner_cuts(self, motion: Motion) -> Rows:
         """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
-        t = motion.times - motion.times[0]
+        t = motion.clock
         even = np.linspace(0.0, t[-1], self.n_points)
-        velocity = np.gradient(motion.positions, t, axis=0) / motion.peak
+        velocity = np.gradient(motion.positions, motion.times - motion.times[0], axis=0) / motion.peak
         signal = np.column_stack([np.interp(even, t, column) for column in velocity.T])
         try:
             import ruptures  # type: ignore[import-untyped, import-not-found, unused-ignore]
@@ -308,6 +309,7 @@ class Motion:
     """A recording, smoothed as much as its noise requires."""
 
     times: Array  # shape (T,)
+    clock: Array  # shape (T,); times from 0 on, but for what is longer than a step between samples
     positions: Array  # shape (T, d); smoothed
     speed: Array  # shape (T,); norm of the derivative of the smoothed positions [unit/s]
     # Robust peak speed: nine tenths of the path are covered at lower speed. Weighted by path, not by time, so that
@@ -327,6 +329,9 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Glitches are
     taken out first, see `without_glitches`. The resolution is the speed that must be distinguished from rest, as a
     share of the peak speed.
+
+    A pause may have no samples. The rate is that of the samples without such gaps, each of which counts as ten typical
+    steps, and a recording rests in a gap across which it hardly moves.
     """
     who = f"recording {recording.name!r}" if recording.name else "recording"
     if len(recording) < _MIN_SAMPLES:
@@ -334,13 +339,22 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     t = recording.times - recording.times[0]
     positions = without_glitches(recording.positions)
     variance = noise_variance(positions)
-    passed = np.pi**3 / np.sqrt(2) * variance * recording.duration / (len(t) - 1)
-    slowest, cutoff = _SLOWEST / recording.duration, (len(t) - 1) / recording.duration / 4.0
+    steps = np.diff(t)
+    longest = _longest_step(steps)
+    clock, gaps = np.append(0.0, np.cumsum(np.minimum(steps, longest))), np.flatnonzero(steps > longest)
+    rate = (len(t) - 1) / clock[-1]
+    passed = np.pi**3 / np.sqrt(2) * variance / rate
+    slowest, cutoff = _SLOWEST / clock[-1], rate / 4.0
+    # `Smooth` takes the mean rate: the same penalty is that of a cutoff lower by the fourth root of their ratio.
+    cycles = recording.duration * (clock[-1] / recording.duration) ** 0.25
     demos = Demonstrations([Trajectory(recording.times, positions)])
     for _ in range(_SMOOTHINGS):
-        smooth = Smooth(cutoff * recording.duration).apply(demos).positions
+        smooth = Smooth(cutoff * cycles).apply(demos).positions
         speed = np.linalg.norm(np.gradient(smooth, t, axis=0), axis=1)
-        peak = weighted_quantile(speed, speed * np.gradient(t), _PEAK_PATH)  # of the path
+        across = np.linalg.norm(smooth[gaps + 1] - smooth[gaps], axis=1) / steps[gaps]
+        for beside in (gaps, gaps + 1):
+            speed[beside] = np.minimum(speed[beside], across)
+        peak = weighted_quantile(speed, speed * np.gradient(clock), _PEAK_PATH)  # of the path
         noise = float(np.sqrt(passed * cutoff**3))
         aim = resolution * peak / 4.0
         if noise <= 1.05 * aim or cutoff <= slowest:
@@ -352,7 +366,12 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
             f"{who}: expected some movement, got {recording.duration:.3g} s at rest: the smoothed positions stay "
             f"within {extent:.3g}, the noise is {sigma:.3g}; check the dimensions and the unit of the recording"
         )
-    return Motion(recording.times, smooth, speed, peak, noise, cutoff, steps_of(recording))
+    return Motion(recording.times, clock, smooth, speed, peak, noise, cutoff, steps_of(recording))
+
+
+def _longest_step(steps: Array) -> float:
+    """Return how long a step between two samples may be before it is a gap."""
+    return _GAP * float(np.median(steps))
 
 
 def steps_of(recording: Trajectory) -> Array:
@@ -462,7 +481,8 @@ def _crossings(motion: Motion, t: Array, speed: Array, pieces: Rows) -> Rows:
     first = _last(before & (speed < level[piece_of]), pieces) + 1  # earlier crossings may be noise at rest
     reach = np.minimum(t[higher] - t[first], _REACH * (t[pieces[:, 1] - 1] - t[first]))
     onset = np.searchsorted(t, t[first] - reach + _BLUR / motion.cutoff, side="right") - 1
-    still = _last(before & (speed < _STILL * peaks[piece_of]), pieces)
+    after_gap = np.append(False, np.diff(t) > _longest_step(np.diff(t)))  # a slow gap is rest, too
+    still = _last(before & (speed < np.where(after_gap, level[piece_of], _STILL * peaks[piece_of])), pieces)
     return np.clip(np.maximum(onset, still), pieces[:, 0], higher)
 
 
