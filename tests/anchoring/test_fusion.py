@@ -150,6 +150,11 @@ def test_exactly_as_many_clusters_as_are_asked_for(seed, n_clusters, min_members
     assert sizes.min() >= min_members
 
 
+@pytest.mark.parametrize("count", [8, 9, 10])
+def test_kinds_too_small_to_be_divided_are_all_proposed_where_more_are_asked_for(count):
+    assert len(propose(draw_kinds([4] * 8), n_clusters=count)) == 8
+
+
 def test_more_proposals_than_there_are_movements_for_are_not_made():
     demos = draw_kinds([5, 6])
     assert 2 <= len(propose(demos, n_clusters=11)) <= 3

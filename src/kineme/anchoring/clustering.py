@@ -191,7 +191,7 @@ def _shared(clusters: Clusters, people: NDArray[np.intp] | None) -> bool:
 
 
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
-    """Exactly `n_clusters` clusters of at least `min_members`, if there are enough movements; -1 is none.
+    """Return `n_clusters` clusters of at least `min_members`, or as many as the movements fall into; -1 is none.
 
     By average linkage of the cosines of entries in as many eigenvectors. Clusters of too few members are left over, and
     of the others the loosest is divided until there are enough.
@@ -207,7 +207,18 @@ def _by_directions(vectors: Array, wanted: int, min_members: int = 1) -> Cluster
     distances = np.maximum(1.0 - rows @ rows.T, 0.0)
     distances = 0.5 * (distances + distances.T)
     np.fill_diagonal(distances, 0.0)
-    clusters = without_small(cuts(average_linkage(distances), [wanted])[0], min_members)
+    tree = average_linkage(distances)
+    clusters = _divided(distances, cuts(tree, [wanted])[0], wanted, min_members)
+    if clusters.max() + 1 < wanted:  # a cut into fewer may divide no kind into parts that are all too small
+        fewer = cuts(tree, range(wanted, 0, -1))
+        most = max(fewer, key=lambda cut: np.count_nonzero(np.bincount(cut) >= min_members))
+        clusters = max(clusters, _divided(distances, most, wanted, min_members), key=lambda parts: int(parts.max()))
+    return clusters
+
+
+def _divided(distances: Array, clusters: Clusters, wanted: int, min_members: int) -> Clusters:
+    """Leave over clusters of too few members, and divide the loosest of the others while it has enough for two."""
+    clusters = without_small(clusters, min_members)
     for new in range(int(clusters.max(initial=-1)) + 1, wanted):
         divisible = np.flatnonzero(np.bincount(clusters[clusters >= 0], minlength=1) >= 2 * min_members)
         if not len(divisible):

@@ -42,7 +42,7 @@ def test_a_pause_of_any_length_may_have_no_samples(make_recording, by, seed, pau
     moving = np.any([(start - 0.05 <= t) & (t <= end + 0.05) for start, end in known.truth], axis=0)
     later = np.where(t > known.truth[0, 1] + 0.2, pause, 0.0)
     found = kineme.segment(Trajectory((t + later)[moving], x[moving]), by)
-    expected = known.truth + [[0.0], [pause], [pause]]
+    expected = np.add(known.truth, [[0.0], [pause], [pause]])
     np.testing.assert_allclose(found.cuts, expected, atol=0.2)
 
 
