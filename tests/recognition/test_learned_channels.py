@@ -176,6 +176,29 @@ def test_columns_of_the_same_names_are_what_was_learned_whatever_their_values_lo
     np.testing.assert_array_equal(learned.positions, of_joints(paths).positions)
 
 
+def test_angles_learned_without_a_unit_are_in_that_which_they_wrap_by(of_angles):
+    """Of radians, radians are learned: degrees that are asked for are converted to them."""
+    paths, labels = joints(seed=1)
+    degrees = tuple(one._replace(unit="deg", period=None) for one in JOINTS)
+    asked = of_joints([np.degrees(path) for path in paths], channels=degrees)
+    same(of_angles.recognize(asked), of_angles.recognize(of_joints(paths)))
+    assert of_angles.predict(asked).tolist() == labels
+
+
+def test_explanations_name_the_columns_that_were_learned_in_their_order():
+    moved = ("speed", "load", "force", "torque")
+    channels = tuple(Channel(name, "position", (name,)) for name in moved)
+    u = np.linspace(0, 1, 60)
+    shown = np.column_stack((np.sin(6 * u), u**2, np.sin(6 * u) * u**2, np.cos(3 * u)))
+    other = np.column_stack((np.sin(9 * u), 1 - u**2, np.sin(9 * u) * u, np.cos(5 * u)))
+    recognizer = Recognizer().fit(of_joints([shown, other], list("ab"), channels))
+    asked = shown + np.outer(np.exp(-(((u - 0.5) / 0.05) ** 2)), [0, 0.8, 0, 0])
+    for order in ([0, 1, 2, 3], [3, 2, 1, 0]):
+        there = of_joints([asked[:, order]], channels=tuple(channels[k] for k in order))
+        explained = recognizer.recognize(there)[0].explain()
+        assert (explained.columns, explained.nearest.part) == (moved, "load")
+
+
 def test_a_list_of_movements_of_several_channels_is_refused_too(of_poses):
     six = tuple(Channel(f"j{k}", "angle", (f"j{k}",), "rad") for k in range(6))
     odd = of_joints([np.cumsum(np.random.default_rng(0).normal(size=(30, 6)), axis=0)], ["a"], six)[0]

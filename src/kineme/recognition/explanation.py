@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.channels.channel import Channels, learned_names
 from kineme.movements.channels.detect import point_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.presented import with_units
 from kineme.sampling import runs
 from kineme.similarity.comparison import Comparison, IndexedMovements
 from kineme.similarity.describe import N_POINTS, even_paths, fit_maps, recorded_paths
@@ -275,8 +277,9 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     target, examples = (_ALONG.along(_smooth(movements, cutoff)) for movements in (movement, stored))
     examples = examples[which]
     mapped = fit_maps(examples, target, comparison.normalization, comparison.procrustes).move(examples)
-    path, columns = np.ascontiguousarray(target[0].T), movement._samples.axis_names
-    parts, overlays = _parts(comparison, movement, columns), []
+    channels = comparison.channels or movement.channels  # movements are in the columns that were learned
+    columns = movement._samples.axis_names if channels is None else with_units(learned_names(channels), channels)
+    path, parts, overlays = np.ascontiguousarray(target[0].T), _parts(comparison, channels, columns), []
     for (label, _, similarity), moved in zip(rationale.examples, mapped, strict=True):
         example = np.ascontiguousarray(moved.T)
         squares = by_part(path, example, parts) ** 2
@@ -287,12 +290,12 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     return Explanation(answer, path, columns, parts, overlays[0], runner_up, shares, rationale.by_convolutions)
 
 
-def _parts(comparison: Comparison, movement: Demonstrations, columns: tuple[str, ...]) -> tuple[Part, ...]:
+def _parts(comparison: Comparison, channels: Channels | None, columns: tuple[str, ...]) -> tuple[Part, ...]:
     """Return the points of the movement; its columns where these are none in the plane or in space."""
     n, d = comparison.procrustes.n_points, comparison.procrustes.n_dims
     if d not in (2, 3):
         return tuple(Part(name, (k,)) for k, name in enumerate(columns))
-    names = point_names(movement.channels)
+    names = point_names(channels)
     names = names if len(names) == n else tuple(f"point {k + 1}" for k in range(n))
     return tuple(Part(name, tuple(range(k * d, (k + 1) * d))) for k, name in enumerate(names))
 
