@@ -129,6 +129,20 @@ def test_no_file_is_written_over_unasked_and_the_input_never(pose, tmp_path):
     assert pose.read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("asked", "end", "said"),
+    [(-150, 210, "note: -150 of yaw is taken as 210, in the turn of the recording\n"), (210, 210, ""), (80, 80, "")],
+)
+def test_a_goal_may_be_an_angle_as_the_recording_wraps_it(tmp_path, asked, end, said):
+    t = np.linspace(0, 1.2, 60)
+    yaw = (170 + 40 * t / 1.2 + 180) % 360 - 180
+    table = np.column_stack((t, 0.3 * t, 0.1 * t, yaw))
+    np.savetxt(tmp_path / "yaw.csv", table, delimiter=",", header="t,x,y,yaw", comments="")
+    done = run(tmp_path / "yaw.csv", "--goal", f"0.36,0.12,{asked}", "--settle", "0.5", "-o", tmp_path / "new.csv")
+    assert (done.returncode, done.stderr) == (0, said)
+    assert np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)[-1, 3] == pytest.approx(end, abs=0.5)
+
+
 def test_a_bad_fit_is_said(tmp_path):
     times = np.linspace(0, 1, 300)
     wild = np.column_stack([np.sin(60 * times), np.cos(47 * times)])

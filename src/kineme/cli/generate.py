@@ -63,12 +63,15 @@ def generate(**options: Any) -> None:
     given = {"start": options["start"], "goal": options["goal"], "obstacles": obstacles or None}
     points: dict[str, Any] = {name: None if point is None else np.array(point) for name, point in given.items()}
     movement_options = MovementOptions(**points, **{name: options[name] for name in ("duration", "rate", "settle")})
-    for name in ("start", "goal"):
-        checked_point(learned, points[name], f"--{name}")
+    _, goal = (checked_point(learned, points[name], f"--{name}") for name in ("start", "goal"))
     movement = make(learned, movement_options)
     warn_of_bad_fit(learned)
-    if movement_options.goal is not None and movement_options.settle is None:
-        _warn_of_missed_goal(learned, movement, movement_options.goal)
+    if goal is not None and movement_options.settle is None:
+        _warn_of_missed_goal(learned, movement, goal)
+    for name, taken in () if goal is None else zip(_columns_of_goal(learned), goal.tolist(), strict=True):
+        asked = points["goal"][learned.moving_columns.index(name)]
+        if asked != taken:
+            write(f"note: {asked:g} of {printable(name)} is taken as {taken:g}, in the turn of the recording", err=True)
     if options["save"]:
         learned.primitive.save(options["save"])
     if options["plot"]:
@@ -88,6 +91,12 @@ def generate(**options: Any) -> None:
         write_movement(options["output"], movement.columns, movement.names)
 
 
+def _columns_of_goal(learned: Any) -> tuple[str, ...]:
+    """Return names of the columns of the primitive."""
+    about = learned.primitive.to_recording
+    return tuple(learned.moving_columns if about is None else about.column_names)
+
+
 def warn_of_bad_fit(learned: Any) -> None:
     """Say how far the primitive of a recording is off it, where that is much."""
     from kineme.dmp.generation.generate import largest_deviation
@@ -103,12 +112,11 @@ def warn_of_bad_fit(learned: Any) -> None:
 
 
 def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
-    """Say how far from a goal a movement ends that still moves there, orientations aside."""
+    """Say how far from a goal, in the columns of the primitive, a movement ends that still moves there."""
     about = learned.primitive.to_recording
-    channels = about.moving if about else ()
-    turned = {name for channel in channels if channel.kind == "orientation" for name in channel.columns}
+    turned = {name for channel in (about.orientations if about else ()) for name in channel.columns}
     misses = []
-    for name, goal in zip(learned.moving_columns, goals, strict=True):
+    for name, goal in zip(_columns_of_goal(learned), goals, strict=True):
         column = movement.columns["positions"][:, learned.columns.index(name)]
         if name not in turned and (extent := float(column.max() - column.min())) > 0.0:
             off = abs(float(column[-1]) - float(goal))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names, same_columns
-from kineme.movements.channels.coordinates import columns_of, columns_of_kinds
+from kineme.movements.channels.coordinates import columns_of, columns_of_kinds, period_of_channel
 from kineme.movements.preparation.trim import Step, TrimRest, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels, samples_of
@@ -62,6 +62,26 @@ class RecordedAs:
     def orientations(self) -> Channels:
         """The channels that are orientations: the last columns of a primitive."""
         return tuple(channel for channel in self.moving if channel.kind == "orientation")
+
+    def turns(self, points: Array, near: Array | None = None) -> Array:
+        """Return whole turns (n, d) by which angles of points (n, d), columns of a primitive, are beyond `near` (d,).
+
+        By default that is their mean direction, in the turn of their median. Turned are only angles that are then
+        within an eighth of a turn of it, of a mean all or none: joints with limits are at places far apart in one turn.
+        """
+        turns = np.zeros(points.shape)
+        for k, channel in enumerate(self.plain):
+            angles = points[:, k] if near is None else np.append(points[:, k], near[k])
+            if channel.kind != "angle" or not np.isfinite(period := period_of_channel(channel, angles)):
+                continue
+            if near is None:
+                mean = float(np.angle(np.exp(2j * np.pi * angles / period).sum())) * period / (2.0 * np.pi)
+                mean += period * np.round((np.median(angles) - mean) / period)
+            away = points[:, k] - (mean if near is None else near[k])
+            whole = period * np.round(away / period)
+            is_there = np.abs(away - whole) <= period / 8.0
+            turns[:, k] = np.where(is_there.all() if near is None else is_there, whole, 0.0)
+        return turns
 
     @property
     def column_names(self) -> tuple[str, ...]:

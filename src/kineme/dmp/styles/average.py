@@ -246,7 +246,8 @@ class AveragePrimitive:
 
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
-        return parameters.of_kind(movements, own.dmp, own.n_dims, own.moving_channels, "the same")
+        same = parameters.of_kind(movements, own.dmp, own.n_dims, own.moving_channels, "the same")
+        return parameters.in_one_turn(same, own.starts[0])
 
 
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:

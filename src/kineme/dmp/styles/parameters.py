@@ -66,7 +66,19 @@ def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None)
     """Primitives as they are; movements as `dmp`, by default ``DMP()``, learns them. Rhythms and poses are refused."""
     if isinstance(movements, Batch):
         check_primitives(movements)
-    return movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
+    return in_one_turn(movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements))
+
+
+def in_one_turn(primitives: Primitives, near: Array | None = None) -> Primitives:
+    """Primitives whose angles start in the turn of `near` (d,), by default of their mean direction.
+
+    Each recording is unwrapped from its own first sample: those of one movement may be whole turns apart.
+    """
+    about = primitives.recorded_as
+    turns = np.zeros(1) if about is None or not len(primitives) else about.turns(primitives.starts, near)
+    if not turns.any():
+        return primitives
+    return replace(primitives, starts=primitives.starts - turns, goals=primitives.goals - turns)
 
 
 def of_kind(

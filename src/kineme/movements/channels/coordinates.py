@@ -170,9 +170,7 @@ def period_by_unit(unit: str | None) -> float | None:
 
 def unit_by_period(channel: Channel) -> str | None:
     """Return the unit of a channel, of an angle without one by what it wraps by."""
-    return channel.unit or (
-        {_TURN: "rad", 360.0: "deg"}.get(channel.period or 0.0) if channel.kind == "angle" else None
-    )
+    return channel.unit or {_TURN: "rad", 360.0: "deg"}.get(channel.period or 0.0)
 
 
 def period_of(angles: Array, unit: str | None) -> float:
