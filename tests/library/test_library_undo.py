@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Demonstrations
+from kineme import ActionLibrary, Demonstrations, load_lasa
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import learn as learning
 from kineme.library.storage.undo import can_undo
@@ -238,3 +238,28 @@ def test_a_version_that_cannot_be_restored_is_refused(library):
     with pytest.raises(SpecificationError, match=f"the library is as at version {seen}; nothing was changed"):
         library.undo(to=seen)
     assert library.version == seen + 2
+
+
+def _sizes(library):
+    return [len(proposal) for proposal in library.propose()]
+
+
+def test_what_is_rejected_is_proposed_again_while_that_is_undone(place):
+    with ActionLibrary(place, create=True) as library:
+        library.learn([movement.positions for movement in load_lasa(["Angle", "Sine", "Worm"])])
+        assert _sizes(library) == [7, 7, 7]
+        library.reject(library.propose()[0])
+        assert _sizes(library) == [7, 7]
+        library.undo()
+        assert _sizes(library) == [7, 7, 7]
+        library.undo(to=2)
+        assert _sizes(library) == [7, 7]
+        library.undo()
+        assert _sizes(library) == [7, 7, 7]
+        library.reject(library.propose()[0])
+        library.reject(library.propose()[0])
+        library.undo()  # the second one alone
+        assert _sizes(library) == [7, 7]
+        for version, sizes in enumerate([[7] * 3, [7] * 2, [7] * 3, [7] * 2, [7] * 3, [7] * 2, [7], [7] * 2], start=1):
+            with library.at(version) as past:
+                assert _sizes(past) == sizes
