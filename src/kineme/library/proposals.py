@@ -96,7 +96,9 @@ def propose(
         proposals = _behind(stored, proposals, free, len(chosen))
     if ids is None:
         rejected = [version.detail.get("movements", []) for version in in_effect(store) if version.action == "reject"]
-        proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, members)) for members in rejected])
+        now = read.returned_ids(store)
+        members = ([now.get(key, key) for key in keys] for keys in rejected)
+        proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, keys)) for keys in members])
     return LibraryProposals(chosen, proposals)
 
 
@@ -149,9 +151,10 @@ def stored_proposals(store: Store) -> list[NamedProposal]:
     detail = next((version.detail for version in in_effect(store) if version.action == _DISCOVER), None)
     if detail is None:
         return []
-    ends = np.cumsum(detail["sizes"])[:-1]
-    parts = np.split(np.array(detail["movements"], dtype=np.int64), ends)
-    rows = zip(detail["names"], parts, detail["medoids"], detail["certainties"], strict=True)
+    now = read.returned_ids(store)
+    ids = np.array([now.get(key, key) for key in (*detail["movements"], *detail["medoids"])], dtype=np.int64)
+    *parts, medoids = np.split(ids, np.cumsum(detail["sizes"], dtype=np.intp))
+    rows = zip(detail["names"], parts, medoids.tolist(), detail["certainties"], strict=True)
     return [NamedProposal(*row) for row in rows]
 
 
