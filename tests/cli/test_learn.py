@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 from commands import answer, run, start
@@ -217,6 +219,17 @@ def test_a_label_that_is_not_taken_is_said(recordings, tmp_path):
     again = answer("learn", name, "--label", "other", "-l", tmp_path / "library")
     assert again["kept"] == [{"symbol": "wave", "label": "other", "movements": 1}]
     assert "no symbol" not in done.stdout
+
+
+def test_a_label_that_is_not_taken_since_the_same_call_has_another_is_said(recordings, tmp_path):
+    name = sorted(recordings.glob("*/*"))[0]
+    for label in ("apple", "pear"):
+        (tmp_path / "fruit" / label).mkdir(parents=True)
+        shutil.copy(name, tmp_path / "fruit" / label)
+    words = ("learn", tmp_path / "fruit", "-l", tmp_path / "library")
+    done = run(*words)
+    assert "1 movement in apple already: the label pear is not taken; kineme library" in done.stdout
+    assert answer(*words)["kept"] == [{"symbol": "apple", "label": "pear", "movements": 1}]
 
 
 def test_a_pause_in_which_one_movement_may_end_and_another_begin_is_said(tmp_path):

@@ -108,6 +108,20 @@ def test_the_same_movement_twice_in_one_call_is_one_movement(library):
     assert (report.added, report.duplicates, report.ids.tolist()) == (2, 1, [1, 2, 1])
 
 
+@pytest.mark.parametrize("n_calls", [1, 2, 4])
+def test_the_first_label_and_the_first_person_count_in_one_call_as_in_several(library, n_calls):
+    """A copy of a movement adds what was not said of it, and changes nothing that was."""
+    demos = draw_movements(2)
+    copies, labels = [0, 0, 1, 0], [None, "pear", "fig", "apple"]
+    people, symbols = ["ann", "bob", None, "bob"], []
+    for some in np.split(np.arange(4), n_calls):
+        several = [demos[copies[i]] for i in some]
+        symbols += library.learn(several, [labels[i] for i in some], groups=[people[i] for i in some]).symbols
+    assert symbols == ["pear", "fig"]
+    assert {symbol.name: symbol.members.tolist() for symbol in library.symbols()} == {"pear": [1], "fig": [2]}
+    assert library.groups().tolist() == ["ann", None]
+
+
 def test_place_and_time_tell_movements_apart_but_not_their_origin_in_time(library):
     movement = draw_movements(1, ragged=True)[0]
     shifted = Trajectory(movement.times, movement.positions + 1.0)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Demonstrations
+from kineme import ActionLibrary, Demonstrations, load_lasa
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library import learn as learning
+from kineme.library.proposals import NamedProposal, store_proposals, stored_proposals
 from kineme.library.storage.undo import can_undo
 
 
@@ -238,3 +239,59 @@ def test_a_version_that_cannot_be_restored_is_refused(library):
     with pytest.raises(SpecificationError, match=f"the library is as at version {seen}; nothing was changed"):
         library.undo(to=seen)
     assert library.version == seen + 2
+
+
+def _sizes(library):
+    return [len(proposal) for proposal in library.propose()]
+
+
+def test_what_is_rejected_is_proposed_again_while_that_is_undone(place):
+    with ActionLibrary(place, create=True) as library:
+        library.learn([movement.positions for movement in load_lasa(["Angle", "Sine", "Worm"])])
+        assert _sizes(library) == [7, 7, 7]
+        library.reject(library.propose()[0])
+        assert _sizes(library) == [7, 7]
+        library.undo()
+        assert _sizes(library) == [7, 7, 7]
+        library.undo(to=2)
+        assert _sizes(library) == [7, 7]
+        library.undo()
+        assert _sizes(library) == [7, 7, 7]
+        library.reject(library.propose()[0])
+        library.reject(library.propose()[0])
+        library.undo()  # the second one alone
+        assert _sizes(library) == [7, 7]
+        for version, sizes in enumerate([[7] * 3, [7] * 2, [7] * 3, [7] * 2, [7] * 3, [7] * 2, [7], [7] * 2], start=1):
+            with library.at(version) as past:
+                assert _sizes(past) == sizes
+
+
+def test_deleted_movements_that_return_are_rejected_and_proposed_as_before(place):
+    def shown(library):
+        names = dict(zip(library.ids(), library.movements().names, strict=True))
+        return [(each.name, names[each.medoid], {names[i] for i in each.members}) for each in library.propose()]
+
+    demos = load_lasa(["Angle", "Sine", "Worm"])
+    with ActionLibrary(place, create=True) as library:
+        ids = library.learn(demos, [None] * len(demos)).ids
+        store_proposals(
+            library.store, [NamedProposal(f"kind {k}", ids[7 * k : 7 * k + 7], 7 * k + 4, 0.9) for k in range(3)]
+        )
+        library.reject(library.propose()[2])
+        before, version = shown(library), library.version
+        assert [each[:2] for each in before] == [("kind 0", "Angle 4"), ("kind 1", "Sine 4")]
+        for deleted in (demos.names[:1], demos.names[3:12], demos.names[14:], demos.names):
+            names = library.movements().names
+            library.delete([i for i, name in zip(library.ids(), names, strict=True) if name in deleted])
+            library.undo()
+            assert shown(library) == before
+        library.undo(to=0)
+        assert stored_proposals(library.store) == []
+        library.undo(to=version)
+        assert shown(library) == before
+        with library.at(version) as past:
+            assert shown(past) == before
+        library.delete(library.ids())
+        library.learn(demos, [None] * len(demos))  # they return in this way, too
+        assert shown(library) == before
+        assert library.verify() == []

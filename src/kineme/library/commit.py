@@ -171,7 +171,7 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
     """Return movement -> label, for movements with a label that belong to no symbol yet."""
-    labeled = {key: label for key, label in zip(keys, batch.labels, strict=True) if label is not None}
+    labeled = _first_names(keys, batch.labels)
     if not labeled:
         return {}
     query = f"SELECT movement FROM member WHERE removed IS NULL AND {among('movement')}"
@@ -182,9 +182,18 @@ def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int,
 
 def _without_person(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
     """Return movement -> who showed it, for movements of which that is said and was not known."""
-    said = {key: group for key, group in zip(keys, batch.groups, strict=True) if group is not None}
+    said = _first_names(keys, batch.groups)
     people = people_by_movement(connection, list(said), NOW) if said else {}
     return {key: group for key, group in said.items() if key not in people}
+
+
+def _first_names(keys: list[int], names: list[str | None]) -> dict[int, str]:
+    """Return movement -> the first name that is said of it: copies later in the batch change nothing."""
+    first: dict[int, str] = {}
+    for key, name in zip(keys, names, strict=True):
+        if name is not None:
+            first.setdefault(key, name)
+    return first
 
 
 @dataclass

@@ -524,7 +524,7 @@ class ActionLibrary:
         accept(self.store, proposal, name, description)
 
     def reject(self, proposal: Proposal) -> None:
-        """Reject a proposal: its movements stay without a symbol and are not proposed again."""
+        """Reject a proposal: its movements stay without a symbol and are not proposed again, until that is undone."""
         from kineme.library.proposals import reject
 
         reject(self.store, proposal)

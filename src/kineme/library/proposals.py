@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,8 +16,8 @@ from kineme.library.members import Members, described, groups_of, members_of, so
 from kineme.library.recognize import known_members
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
-from kineme.library.storage.schema import RETURNS
-from kineme.library.storage.store import Store, history
+from kineme.library.storage.store import Store
+from kineme.library.storage.undo import in_effect
 from kineme.recognition.answer import KnownClasses, open_set_labels
 from kineme.recognition.classifiers import MOST
 from kineme.reporting.text import counted
@@ -96,8 +95,10 @@ def propose(
     if stored:
         proposals = _behind(stored, proposals, free, len(chosen))
     if ids is None:
-        rejected = [version.detail.get("movements", []) for version in history(store) if version.action == "reject"]
-        proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, members)) for members in rejected])
+        rejected = [version.detail.get("movements", []) for version in in_effect(store) if version.action == "reject"]
+        now = read.returned_ids(store)
+        members = ([now.get(key, key) for key in keys] for keys in rejected)
+        proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, keys)) for keys in members])
     return LibraryProposals(chosen, proposals)
 
 
@@ -147,19 +148,13 @@ def store_proposals(store: Store, proposals: Sequence[NamedProposal]) -> int:
 
 def stored_proposals(store: Store) -> list[NamedProposal]:
     """Return the proposals that were stored last, as far as that was not taken back."""
-    at: dict[int, Mapping[str, Any] | None] = {0: None}  # version -> the proposals that were stored by then
-    detail: Mapping[str, Any] | None = None
-    for version in history(store):
-        if version.action == _DISCOVER:
-            detail = version.detail
-        elif version.action in RETURNS:
-            detail = at[version.detail["to"]]
-        at[version.id] = detail
+    detail = next((version.detail for version in in_effect(store) if version.action == _DISCOVER), None)
     if detail is None:
         return []
-    ends = np.cumsum(detail["sizes"])[:-1]
-    parts = np.split(np.array(detail["movements"], dtype=np.int64), ends)
-    rows = zip(detail["names"], parts, detail["medoids"], detail["certainties"], strict=True)
+    now = read.returned_ids(store)
+    ids = np.array([now.get(key, key) for key in (*detail["movements"], *detail["medoids"])], dtype=np.int64)
+    *parts, medoids = np.split(ids, np.cumsum(detail["sizes"], dtype=np.intp))
+    rows = zip(detail["names"], parts, medoids.tolist(), detail["certainties"], strict=True)
     return [NamedProposal(*row) for row in rows]
 
 

@@ -51,6 +51,14 @@ def _ids(store: Store, without: str, count_at: Callable[[Moment], int]) -> Ids:
     return ids
 
 
+def returned_ids(store: Store) -> dict[int, int]:
+    """Return id -> id now, of movements that were deleted and came back, by an undo or learned again."""
+    back = f"(SELECT id, digest FROM movement WHERE {ALIVE}) AS back"
+    query = f"SELECT gone.id, back.id FROM movement AS gone JOIN {back} USING (digest) WHERE gone.removed <= :v"
+    with store.reading() as connection:
+        return dict(connection.execute(query, {"v": store.as_of}))
+
+
 def as_ids(store: Store, ids: Any) -> Ids:
     """Return a user's ids as an array; all must be in the library."""
     wanted = np.atleast_1d(np.asarray(ids))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from numbers import Integral
 from typing import NamedTuple
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Database, Row, among, has_table, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
-from kineme.library.storage.store import NOW, Change, Store, repeated
+from kineme.library.storage.store import NOW, Change, Store, Version, history, repeated
 
 _DIGEST, _PROTOTYPE = COLUMNS["movement"].index("digest"), COLUMNS["symbol_state"].index("prototype")
 
@@ -57,6 +57,17 @@ def can_undo(store: Store) -> bool:
     """Tell whether there is a change to take back."""
     with store.reading() as connection:
         return not store.read_only and _effective(connection, store.moment(connection).version) > 0
+
+
+def in_effect(store: Store) -> Iterator[Version]:
+    """Yield the versions whose changes were not taken back, the last one first."""
+    last = store.as_of
+    for version in reversed(history(store)):
+        if version.id <= last:
+            if version.action not in RETURNS:
+                yield version
+            else:  # those since the one that it returned to
+                last = version.detail["to"]
 
 
 def _effective(connection: Database, version: int, returns: tuple[str, ...] = (UNDO,)) -> int:
