@@ -297,19 +297,10 @@ def known_labels(
 
 
 class Verdict(NamedTuple):
-    """An `Answer` without its movements, and the `shares` (R,) of the representations."""
+    """An answer without its movements, and what it says of them."""
 
-    label: Label | None
-    confidence: float
-    probabilities: Mapping[Label, float]
-    p_known: float
-    p_values: Mapping[Label, float]
-    rule: str
-    calibrated: bool
-    ranked: tuple[Label, ...]
-    nearest: tuple[Neighbor, ...]
-    responsibilities: Mapping[str, float]
-    shares: Array
+    answer: Answer
+    shares: Array  # (R,), of the representations
     examples: tuple[tuple[Label, int, float], ...]  # of `Rationale`
     by_convolutions: bool
 
@@ -349,16 +340,18 @@ def verdicts_of(
     confidence = np.where(p_known > error_rate, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
-            labels[i],
-            confidence[i],
-            dict(zip(classes, probabilities[i].tolist(), strict=True)),
-            float(p_known[i]),
-            dict(zip(classes, p[i].tolist(), strict=True)),
-            rules[i],
-            calibrated,
-            tuple(classes[c] for c in ranks[i].tolist()),
-            like[i],
-            {name: float(share[rows, i].sum()) for name, rows in rows_of.items()},
+            Answer(
+                labels[i],
+                confidence[i],
+                dict(zip(classes, probabilities[i].tolist(), strict=True)),
+                float(p_known[i]),
+                dict(zip(classes, p[i].tolist(), strict=True)),
+                rules[i],
+                calibrated,
+                tuple(classes[c] for c in ranks[i].tolist()),
+                like[i],
+                {name: float(share[rows, i].sum()) for name, rows in rows_of.items()},
+            ),
             share[:, i],
             examples[i],
             isinstance(classifier, BY_CONVOLUTIONS),
@@ -371,16 +364,13 @@ def answers_of(
     verdicts: Sequence[Verdict], comparison: Comparison, references: IndexedMovements, demos: Demonstrations
 ) -> list[Answer]:
     """Return the answers to movements, which keep the movements and the references that these are most like."""
-    example = np.array([verdict.nearest[0].index for verdict in verdicts], dtype=np.intp)
+    example = np.array([verdict.answer.nearest[0].index for verdict in verdicts], dtype=np.intp)
     share = np.stack([verdict.shares for verdict in verdicts], axis=1)
     matches = Matches(comparison, references, demos, example, share)
-    given = []
-    for row, verdict in enumerate(verdicts):
-        fields = verdict._asdict()
-        del fields["shares"]
-        rests_on = Rationale(matches, row, fields.pop("examples"), fields.pop("by_convolutions"))
-        given.append(Answer(**fields, _rests_on=rests_on))
-    return given
+    return [
+        replace(answer, _rests_on=Rationale(matches, row, examples, by_convolutions))
+        for row, (answer, _, examples, by_convolutions) in enumerate(verdicts)
+    ]
 
 
 def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:

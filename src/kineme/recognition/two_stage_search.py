@@ -103,9 +103,9 @@ class TwoStageSearch:
             owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
             verdict = verdicts_of(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
             rows = self.stored.members[chosen]
-            near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.nearest)
+            near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.answer.nearest)
             examples = tuple((label, int(rows[index]), similarity) for label, index, similarity in verdict.examples)
-            verdicts.append(verdict._replace(nearest=near, examples=examples))
+            verdicts.append(verdict._replace(answer=replace(verdict.answer, nearest=near), examples=examples))
         return verdicts
 
     def reduced(self, described: Described) -> tuple[ReducedFeatures, ...]:
