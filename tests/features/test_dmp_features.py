@@ -125,7 +125,7 @@ def test_demonstrations_and_a_list_of_arrays_cross_validate_alike(demos):
     assert cross_val_score(model, block, demos.labels, cv=3, error_score="raise").tolist() == [1.0, 1.0, 1.0]
 
 
-@pytest.mark.parametrize(("n_dims", "axes"), [(1, "x"), (2, "xy"), (3, "xyz"), (4, ["q1", "q2", "q3", "q4"])])
+@pytest.mark.parametrize(("n_dims", "axes"), [(1, "x"), (2, "xy"), (3, "xyz"), (4, ["x1", "x2", "x3", "x4"])])
 @pytest.mark.parametrize("feature", FEATURES)
 def test_names_say_axis_and_number_of_each_column(make_movement, feature, n_dims, axes):
     features = DMPFeatures(feature, DMP(n_basis=5), n_samples=6)

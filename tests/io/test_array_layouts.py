@@ -47,6 +47,16 @@ def test_natural_layouts(arrays, places, layout):
         np.testing.assert_array_equal(movement.positions, X)
 
 
+def test_columns_without_names_are_no_joints_and_do_not_wrap_where_they_jump():
+    t = np.arange(60) / 30
+    fingers = np.column_stack((np.where(t < 1, 300, 10), t, t, 1 - t))  # in pixels
+    demos = read({"times": t, "positions": fingers}).demonstrations
+    np.testing.assert_array_equal(demos.positions, fingers)
+    assert demos.dimensions == ("x1", "x2", "x3", "x4")
+    named = read({"times": t, "positions": fingers, "columns": np.array(["q1", "q2", "q3", "q4"])}).demonstrations
+    assert {channel.kind for channel in named.channels} == {"angle"}
+
+
 SKELETON = np.sin(np.linspace(0, 3, 40))[:, None, None] + np.random.default_rng(0).normal(size=(7, 3))  # (40, 7, 3)
 
 

@@ -10,6 +10,7 @@ import kineme
 from kineme.io.inspection.inspect import inspect
 from kineme.io.reading.column_order import notes_on_aside
 from kineme.io.reading.merge_files import notes_on_gaps
+from kineme.io.writing.write_movement import write_movement
 from kineme.movements.tables.layout import Layout
 from recordings_in_bytes import read_recordings_from_bytes
 
@@ -33,6 +34,7 @@ def _written(path, heads, values=None):
         (["nose_x", "nose_y"], ["nose_likelihood"]),
         (["x0", "y0", "Hand.X", "Hand.Y"], ["score0", "Hand.Visibility"]),
         (["x", "y"], ["confidence", "residual"]),
+        (["pos_x", "y_position"], ["pos_x_vel", "a_y_position", "pos_confidence"]),
         (["q[0]", "actual_q_0"], ["dq[0]", "actual_qd_0", "qdot[0]"]),
     ],
 )
@@ -55,6 +57,27 @@ def test_the_same_words_without_such_positions_are_coordinates(tmp_path, heads):
     read = kineme.read_recordings(_written(tmp_path / "a.csv", heads))
     assert read.detected[0][0].columns == heads
     assert notes_on_aside(how for how, _ in read.detected) == []
+
+
+@pytest.mark.parametrize(
+    "heads",
+    [
+        "x,y", "x [mm],y [mm]", "hand_x_m,hand_y_m", "tcp_x,tcp_y", "a,b", "a_x,a_y", "q1,q2", "column 1,column 2",
+        "pos", "pos_x,pos_y", "pose.position.x,pose.position.y", "joint1_position,joint2_position",
+        "position_x,position_y", "x position,y position", "Pos X (mm),Pos Y (mm)", "Position X,Position Y",
+        "Position (x),Position (y)",
+        "/pose/position/x,/pose/position/y", "position[0],position[1]", "posX,posY", "x_pos,y", "position,angle",
+        "shoulder_pan.pos,elbow_flex.pos", "left pos x,left pos y,right pos x,right pos y", "pos_x_mm,pos_y_mm",
+        "vx,vy", "v_x,v_y", "velocity_x,velocity_y", "acc_x,acc_y,acc_z", "speed", "confidence", "dx,dy", "pos_vel,x",
+    ],
+)  # fmt: skip
+def test_what_is_generated_has_the_columns_of_its_demonstration_whatever_their_names(tmp_path, heads):
+    demos = kineme.read_recordings(_written(tmp_path / "a.csv", heads.split(","))).demonstrations
+    path = write_movement(tmp_path / "new.csv", kineme.DMP().learn(demos).rollout())
+    assert path.read_text().splitlines()[0].count(",") == 3 * demos.n_dims
+    read = kineme.read_recordings(path).demonstrations.channels
+    assert [channel.columns for channel in read] == [channel.columns for channel in demos.channels]
+    assert [channel.kind for channel in read] == [channel.kind for channel in demos.channels]
 
 
 def test_counters_numbers_of_things_and_other_clocks_are_no_coordinates(tmp_path):

@@ -217,6 +217,10 @@ def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_o
     assert [answer.ranked[0] for answer in library.recognize(raw)] == expected
     assert library.learn(questions).added == 6
     assert library.learn(raw).added == 0
+    counted = tuple(Channel(f"x{k}", "position", (f"x{k}",)) for k in range(1, questions.recorded.shape[1] + 1))
+    read = Demonstrations.of_movements(of_channels(Demonstrations.of(raw).movements, counted))  # as from an array file
+    assert [answer.ranked[0] for answer in library.recognize(read)] == expected
+    assert library.learn(read).added == 0
     assert library.verify() == []
 
 

@@ -168,6 +168,21 @@ def test_columns_of_other_kinds_are_refused(of_angles, of_poses):
     assert of_poses.predict(Demonstrations.of_movements(claw)).tolist() == list("ababab")
 
 
+def test_columns_that_only_count_are_taken_as_without_names(of_angles, of_poses):
+    paths, labels = joints()
+    counted = tuple(Channel(f"x{k}", "position", (f"x{k}",)) for k in range(1, 9))
+    unwrapped = [one.positions for one in of_joints(paths)]
+    assert of_angles.predict(of_joints(paths, channels=counted[:3])).tolist() == labels
+    assert Recognizer().fit(of_joints(unwrapped, labels, counted[:3])).predict(of_joints(paths)).tolist() == labels
+    jumping = (*counted[:2], counted[2]._replace(kind="angle", period=2 * np.pi))  # by its values
+    assert of_angles.predict(of_joints(paths, channels=jumping)).tolist() == labels
+    raw = [one.recorded for one in poses()]
+    assert of_poses.predict(of_joints(raw, channels=counted)).tolist() == list("ababab")
+    millimeters = tuple(one._replace(unit="mm") for one in counted)
+    with pytest.raises(TrajectoryError, match=r"recorded as gripper \(discrete\), .* got x1 \(position\)"):
+        of_poses.predict(of_joints(raw, channels=millimeters))
+
+
 def test_columns_of_the_same_names_are_what_was_learned_whatever_their_values_look_like(of_angles):
     paths, labels = joints()
     positions = tuple(one._replace(kind="position", period=None) for one in JOINTS)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
-from kineme import read_recordings
+from kineme import Trajectory, read_recordings
 from kineme.errors import TrajectoryError
+from kineme.io.writing.write_movement import write_movement
 from kineme.movements.channels.channel import Channel
 from kineme.robots import load, move
+from kineme.robots.planning.move import request_of
 from kineme.robots.planning.roles import check_order, joints_among, space_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -95,6 +99,46 @@ def test_names_of_other_joints_are_refused_and_no_names_are_said(tmp_path):
             _moved(tmp_path, [f"{name} [rad]" for name in names], joints)
     with pytest.warns(UserWarning, match="q0, q1, q2, q3, q4, q5 are taken as shoulder_pan_joint, .* one after"):
         assert _moved(tmp_path, [f"q{k}" for k in range(6)], joints) == pytest.approx(joints[-1], abs=1e-6)
+
+
+def _written(folder, kind, times, columns):
+    path, table = folder / f"{kind}.{kind if kind in {'npz', 'json'} else 'csv'}", np.column_stack((times, columns))
+    match kind:
+        case "npz":
+            np.savez(path, times=times, positions=columns)
+        case "json":
+            path.write_text(json.dumps({"times": times.tolist(), "positions": columns.tolist()}))
+        case "written":
+            write_movement(path, Trajectory(times, columns))
+        case heads:
+            np.savetxt(path, table, delimiter=",", header="" if heads == "bare" else heads, comments="")
+    return path
+
+
+U = np.linspace(0, 1, 60)
+POSES = np.column_stack((U, U**2, 1 - U, np.cos(U), 0.6 * np.sin(U), 0 * U, 0.8 * np.sin(U)))
+
+
+@pytest.mark.parametrize("columns", [POSES, 1.5 * POSES], ids=["poses", "joints"])
+@pytest.mark.parametrize("kind", ["npz", "json", "bare", "written", "t,x1,x2,x3,x4,x5,x6,x7"])
+def test_columns_without_names_are_what_the_same_array_is(tmp_path, kind, columns):
+    robot = load("wam")
+    read = request_of(read_recordings(_written(tmp_path, kind, 3 * U, columns)), robot, "auto")
+    array = request_of(Trajectory(3 * U, columns), robot, "auto")
+    assert (read.space, array.space) == ("tip" if columns is POSES else "joints",) * 2
+    np.testing.assert_allclose(read.positions, array.positions, atol=1e-12)
+    assert (read.orientations is None) == (array.orientations is None)
+
+
+def test_as_many_columns_without_names_as_the_arm_has_joints_are_these_and_a_person_names_them_so(tmp_path):
+    arm = load("ur5e")
+    turning = (6 * U[:, None] + np.pi) % (2 * np.pi) - np.pi
+    for columns in (POSES[:, :6], np.hstack((turning, POSES[:, :5]))):
+        path = _written(tmp_path, "npz", 3 * U, columns)
+        with pytest.warns(UserWarning, match="x1, x2, x3, x4, x5, x6 are taken as shoulder_pan_joint"):
+            assert request_of(read_recordings(path), arm, "auto").space == "joints"
+    path = _written(tmp_path, "t,q1,q2,q3,q4,q5,q6,q7", 3 * U, POSES)
+    assert request_of(read_recordings(path), load("wam"), "auto").space == "joints"
 
 
 def test_angles_beside_the_position_of_the_tip_are_refused(tmp_path):

@@ -25,7 +25,7 @@ from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
-from kineme.movements.channels.column_match import columns_recorded, may_be
+from kineme.movements.channels.column_match import are_unknown, columns_recorded, may_be
 from kineme.movements.channels.coordinates import columns_of_kinds
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
@@ -155,6 +155,8 @@ def in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
                 f"{listed(here.heads)}; choose the columns, in the shell with --columns (--feature of kineme "
                 "discover), or make another library"
             )
+        if len(here.heads) == len(there.heads) and are_unknown(demos.channels):  # as without channels
+            return of_columns(demos, ours)
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
 
 

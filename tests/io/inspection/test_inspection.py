@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kineme.io.inspection.figure import draw_recordings
-from kineme.io.inspection.inspect import as_data, as_words, duplicates_among, inspect
+from kineme.io.inspection.inspect import as_data, as_words, duplicates_among, inspect, notes_on_samples
 from kineme.io.reading.merge_files import GAP, sampling_of
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.write_movement import write_movement
@@ -149,6 +150,47 @@ def test_a_column_beside_which_the_others_hardly_count_is_noticed():
 )
 def test_columns_of_one_kind_may_move_alone(columns):
     assert spans(**columns) == ()
+
+
+U = np.linspace(-1, 1, 60)[:, None]
+DOWN = Rotation.from_euler("xy", np.hstack((0.3 * U, 0.2 * U))) * Rotation.from_rotvec([np.pi, 0, 0])  # it flips
+
+
+def on_rotations(heads, turned):
+    """The notes on rotation vectors of a recording of a tool: its place, and three columns more."""
+    table = np.hstack((U + 1, 0.1 * U, 0.2 * U**2, 0.3 * U, turned))
+    rows = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist())
+    recordings = read_recordings_from_bytes(f"time,{','.join(heads)}\n{rows}".encode(), "a.csv", Layout())
+    return [note for note in notes_on_samples(recordings) if "rotation vector" in note]
+
+
+@pytest.mark.parametrize(
+    "head", ["{}", "tcp_{}", "TCP.{}", "pose.{}", "{} [rad]", "actual_TCP_pose_{}", "target_TCP_pose[{}]"]
+)
+def test_a_rotation_vector_near_half_a_turn_is_noticed_with_what_to_do(head):
+    ends = [*range(6)] if "TCP_pose" in head else ["x", "y", "z", "rx", "ry", "rz"]
+    heads = [head.format(end).removesuffix(" [rad]" if k < 3 else "-") for k, end in enumerate(ends)]
+    (note,) = on_rotations(heads, DOWN.as_rotvec())
+    assert note.startswith(f"{', '.join(heads[3:])} look like a rotation vector: near half")
+    assert note.endswith("qx, qy, qz, qw instead, in Python scipy.spatial.transform.Rotation.from_rotvec(r).as_quat()")
+
+
+def test_degrees_of_a_rotation_vector_are_said():
+    (note,) = on_rotations(["tx", "ty", "tz", "rx [deg]", "ry [deg]", "rz [deg]"], DOWN.as_rotvec(degrees=True))
+    assert note.endswith("from_rotvec(r, degrees=True).as_quat()")
+
+
+@pytest.mark.parametrize(
+    ("heads", "factor"),
+    [
+        ("a,b,c,rx,ry,rz", 1), ("x,y,z,fx,fy,fz", 1), ("x,y,z,rx,ry,rz", 0.3), ("x,y,z,rx,ry,rz", 9),
+        ("x,y,z,rx [N],ry [N],rz [N]", 1), ("vel_x,vel_y,vel_z,vel_rx,vel_ry,vel_rz", 1),
+        ("q_0,q_1,q_2,q_3,q_4,q_5", 1), (",".join(f"joint_pose_{k}" for k in range(6)), 1),
+        ("x,y,z,roll,pitch,yaw", 1), ("x,y,z,hand_rx,hand_ry,hand_rz", 1),
+    ],
+)  # fmt: skip
+def test_forces_joints_and_small_rotations_are_no_rotation_vector(heads, factor):
+    assert on_rotations(heads.split(","), factor * DOWN.as_rotvec()) == []
 
 
 def test_long_lists_are_cut_in_words_only_and_a_reason_of_many_files_is_said_once(tmp_path, make_movement):

@@ -41,7 +41,7 @@ class ColumnNames(NamedTuple):
 
 
 def encode_movement(columns: Columns, ending: str, names: ColumnNames | None = None) -> bytes:
-    """Give the bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or q1, q2, ..."""
+    """Give the bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or x1, x2, ..."""
     if ending not in WRITERS:
         raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
     return WRITERS[ending](columns, names)

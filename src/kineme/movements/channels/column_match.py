@@ -64,6 +64,12 @@ def columns_recorded(channels: Channels, by_period: bool = False) -> Columns:
     return Columns(recorded_names(channels), tuple(units))
 
 
+def are_unknown(channels: Channels) -> bool:
+    """Tell whether nothing is known of columns but their number: heads count them, not as joints, and say no unit."""
+    kinds = {channel.unit or channel.kind for channel in channels}
+    return {"position"} <= kinds <= {"position", "angle"} and columns_recorded(channels).are_nameless
+
+
 def may_be(channels: Channels, others: Channels) -> bool:
     """Tell whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
     names = [Columns(tuple(channel.name for channel in several), ()).names for several in (channels, others)]

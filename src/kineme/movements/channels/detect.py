@@ -51,7 +51,7 @@ DISCRETE_WORDS = frozenset(
     }
 )  # fmt: skip
 #: A column that has one of them is no angle, whatever else its head says: ``joint1_torque``, ``yaw rate``.
-_OTHER_QUANTITIES = frozenset(
+OTHER_QUANTITIES = frozenset(
     {
         "velocity", "velocities", "vel", "speed", "rate", "acceleration", "accelerations", "acc", "accel", "jerk",
         "torque", "torques", "tau", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro",
@@ -169,7 +169,7 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
         return "discrete"
     measure = unit_named(unit or "")
     rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
-    if rate or words & _OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
+    if rate or words & OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
         return "position"
     named = words & ANGLE_WORDS and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
     if is_joint or named or measure is not None or wrap_period(values, offsets) is not None:
@@ -277,7 +277,7 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 
 
 #: Columns with one of them are no places, though they have three axes.
-_NO_PLACES = _OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
+_NO_PLACES = OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
 
 
 def point_names(channels: Channels | None) -> tuple[str, ...]:

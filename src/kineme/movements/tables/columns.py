@@ -308,11 +308,12 @@ def beside_positions(heads: Sequence[str]) -> set[str]:
 
     So ``x_vel``, ``vx``, ``dx`` and ``x_dot`` beside ``x`` or ``pos_x``, and ``nose_score`` beside ``nose_x``.
     """
-    words = {head: _spelled_out(head) for head in heads}
+    written = {mark + _plain(head) for head in heads for mark in ("v_", "a_")}  # as kineme writes them, of any name
+    words = {head: _without(_spelled_out(head), _POSITION_WORDS) for head in heads}
     noted = {head: {*parts} & (_DERIVATIVE_WORDS | _CONFIDENCE_WORDS) for head, parts in words.items()}
-    places = {_without(parts, _POSITION_WORDS) for head, parts in words.items() if not noted[head]}
+    places = {parts for head, parts in words.items() if not noted[head]}
     points = {_without(parts, _AXES) for parts in places if _AXES & {*parts}}
-    return {
+    return {head for head in heads if _plain(head) in written} | {
         head
         for head, parts in words.items()
         if noted[head] and _without(parts, noted[head]) in (places if noted[head] <= _DERIVATIVE_WORDS else points)

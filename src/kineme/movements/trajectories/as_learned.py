@@ -9,7 +9,7 @@ import numpy as np
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, in_words, is_plain, moving_kinds, recorded_names, same_columns
-from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion, may_be
+from kineme.movements.channels.column_match import are_unknown, columns_like, columns_recorded, conversion, may_be
 from kineme.movements.channels.coordinates import lever_of, unit_by_period
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.demonstrations import Demonstrations, one_by_one
@@ -36,7 +36,7 @@ def as_learned(
       others left aside, whatever kind their values look like.
     - With channels that may be those, as x, y, z those of a hand, or that only count, as x1, x2, x3, see
       `kineme.movements.channels.column_match.may_be`, their kinds have to be those that were learned, in their
-      order, discrete ones left aside; units are converted. Else what is lacking is said.
+      order, discrete ones left aside; units are converted. Else those that only count are as without channels.
 
     `what` they are called in messages.
     """
@@ -75,6 +75,10 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     if moving_kinds(channels) == moving_kinds(learned):
         _check_names(channels, moving, what)
         return _in_units(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
+    unknown = is_plain(channels) and (are_unknown(channels) or are_unknown(learned))
+    if unknown and demos.n_dims == len(recorded_names(learned)):  # as without channels
+        _check_names(channels, moving, what)
+        return of_columns(as_recorded(demos), learned)
     _check_lacking(channels, moving, what)
     if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))

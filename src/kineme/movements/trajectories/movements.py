@@ -150,8 +150,8 @@ class Samples(NamedTuple):
 
 
 def axis_names(n_dims: int) -> list[str]:
-    """The names x, y, z, or q1, q2, ... beyond three dimensions."""
-    return list("xyz"[:n_dims]) if n_dims <= len("xyz") else [f"q{k + 1}" for k in range(n_dims)]
+    """The names x, y, z, or x1, x2, ... beyond three dimensions: no q, which would say that they are joints."""
+    return list("xyz"[:n_dims]) if n_dims <= len("xyz") else [f"x{k + 1}" for k in range(n_dims)]
 
 
 def merge_close(

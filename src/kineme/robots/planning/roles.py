@@ -10,6 +10,7 @@ import numpy as np
 
 from kineme.errors import TrajectoryError, warn
 from kineme.movements.channels.channel import Channel, Channels
+from kineme.movements.channels.column_match import are_unknown
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.channels.detect import name_of
 from kineme.movements.rotations import NORM_TOLERANCE
@@ -50,11 +51,11 @@ class Scales(NamedTuple):
 
 
 def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot | None = None) -> Roles:
-    """Roles of recorded columns, of which nothing but the number is known if they have no channels.
+    """Roles of recorded columns, of which nothing but the number is known if they have no channels, or no names.
 
     Columns with the names of joints are these, others go along; as many of other names are joints in their order.
     """
-    if channels is None:
+    if channels is None or (space == "tip" and are_unknown(channels)):
         posed = space == "tip" and n_columns == 7
         quaternion = Channel("q", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz")
         positions = list(range(3 if posed else n_columns))
@@ -172,7 +173,7 @@ def space_of(channels: Channels | None, columns: Array, robot: Robot) -> str:
     The joints: columns with the names of its joints, as many angles as the arm has joints, or as many columns, of which
     nothing is known and which are neither points nor poses.
     """
-    if channels is not None:
+    if channels is not None and not are_unknown(channels):
         names = [channel.name for channel in channels if channel.kind in _KINDS["joints"]]
         angles = sum(channel.kind == "angle" for channel in channels)
         return "joints" if joints_among(names, robot) is not None or angles == robot.n_joints else "tip"
