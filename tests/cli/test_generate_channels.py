@@ -130,17 +130,26 @@ def test_no_file_is_written_over_unasked_and_the_input_never(pose, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("asked", "end", "said"),
-    [(-150, 210, "note: -150 of yaw is taken as 210, in the turn of the recording\n"), (210, 210, ""), (80, 80, "")],
+    ("by", "name", "asked", "taken", "said"),
+    [
+        (40, "goal", -150, 210, True),
+        (40, "goal", 210, 210, False),
+        (40, "goal", 80, 80, False),
+        (90, "goal", -100, 260, True),
+        (300, "goal", 110, 470, True),
+        (300, "start", -190, 170, True),
+    ],
 )
-def test_a_goal_may_be_an_angle_as_the_recording_wraps_it(tmp_path, asked, end, said):
+def test_a_start_or_goal_may_be_an_angle_as_the_recording_wraps_it(tmp_path, by, name, asked, taken, said):
     t = np.linspace(0, 1.2, 60)
-    yaw = (170 + 40 * t / 1.2 + 180) % 360 - 180
-    table = np.column_stack((t, 0.3 * t, 0.1 * t, yaw))
-    np.savetxt(tmp_path / "yaw.csv", table, delimiter=",", header="t,x,y,yaw", comments="")
-    done = run(tmp_path / "yaw.csv", "--goal", f"0.36,0.12,{asked}", "--settle", "0.5", "-o", tmp_path / "new.csv")
-    assert (done.returncode, done.stderr) == (0, said)
-    assert np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)[-1, 3] == pytest.approx(end, abs=0.5)
+    yaw = (170 + by * t / 1.2 + 180) % 360 - 180
+    table = np.column_stack((t, 0.3 * t, 0.1 * t, yaw, t > 0.5))
+    np.savetxt(tmp_path / "yaw.csv", table, delimiter=",", header="t,x,y,yaw,gripper", comments="")
+    done = run(tmp_path / "yaw.csv", f"--{name}", f"0.36,0.12,{asked}", "--settle", "0.1", "-o", tmp_path / "new.csv")
+    note = f"note: --{name} {asked} of yaw is taken as {taken}, in the turn of the recording\n"
+    assert (done.returncode, done.stderr) == (0, note * said)
+    end = 0 if name == "start" else -1
+    assert np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)[end, 3] == pytest.approx(taken, abs=0.1)
 
 
 def test_a_bad_fit_is_said(tmp_path):

@@ -13,7 +13,7 @@ from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.styles import average, learn_styles
 
-TURNS = {"deg": 360.0, "rad": 2 * np.pi}
+TURNS = {"deg": 360.0, "rad": 2 * np.pi, None: 360.0}
 
 
 def turning(starts, unit="deg", wrapped=True, by=30.0):
@@ -32,7 +32,7 @@ def turning(starts, unit="deg", wrapped=True, by=30.0):
 @given(
     center=st.floats(-180.0, 180.0),
     away=st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6),
-    unit=st.sampled_from([*TURNS]),
+    unit=st.sampled_from(["deg", "rad"]),
 )
 def test_averages_are_those_of_recordings_in_one_turn(center, away, unit):
     starts = center + np.array(away) - np.mean(away)
@@ -52,10 +52,16 @@ def test_tasks_styles_and_likelihoods_take_them_in_one_turn_too():
     task = Contextual().fit(primitives, parameters=[0.0, 1.0, 2.0, 3.0])
     assert task.primitive(1.5).starts[0, 1] == pytest.approx(178.0, abs=3.0)
     assert learn_styles(primitives, n_styles=1).mean[1, -3] == pytest.approx(176.25, abs=1e-6)
+    assert average(DMP().learn(turning([530.0, 540.0, 542.0, 538.0], wrapped=False))).primitive.starts[0, 1] > 500
     mean = average(primitives)
     np.testing.assert_allclose(
         mean.log_likelihood(primitives, 1.0), average(there).log_likelihood(there, 1.0), rtol=1e-6
     )
+
+
+def test_small_angles_without_a_unit_may_be_degrees_and_stay():
+    primitives = DMP().learn(turning([-3.2, 3.0], None, wrapped=False))
+    assert average(primitives).primitive.starts[0, 1] == pytest.approx(-0.1, abs=1e-9)
 
 
 @pytest.mark.parametrize("starts", [(11.0, 200.0), (-160.0, -60.0, 60.0, 160.0)])

@@ -107,7 +107,7 @@ EXEMPT = {
     "recognition.compared_windows.compare_candidates": "windows of one recording by contract",
     "recognition.compared_windows.Candidates.weighted": "windows of one recording by contract",
     "recognition.compared_windows.size_and_slowness": "windows of one recording by contract",
-    "recognition.answer.Transform.apply": "one movement by contract",
+    "recognition.explanation.Transform.apply": "one movement by contract",
     "dmp.contextual.Contextual.fit": "a regression over the batch; see test_contextual.py",
     "dmp.discrete.encode.choose": "one specification for the whole batch; see test_choose.py",
     "dmp.discrete.encode.relative_paths": "of `choose`, subsampled from the whole batch",

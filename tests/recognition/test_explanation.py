@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,6 +145,17 @@ def test_an_answer_from_another_process_says_what_it_lacks(shapes):
     assert answer.label == labels[0]
     with pytest.raises(SpecificationError, match="without its movements; recognize the movement again"):
         answer.explain()
+    assert replace(answer, confidence=0.5).transform.angle == answer.transform.angle  # computed before it was sent
+
+
+def test_what_an_answer_computes_later_is_of_the_movement_that_was_asked(shapes):
+    demos, labels = shapes
+    block = np.stack([movement.positions[::4][:20] for movement in demos[:3]])
+    recognizer = kineme.Recognizer().fit(demos, labels)
+    expected, answers = recognizer.recognize(block.copy()), recognizer.recognize(block)
+    block[:] = 0.0
+    np.testing.assert_array_equal(answers[1].transform.matrix, expected[1].transform.matrix)
+    np.testing.assert_array_equal(answers[2].explain().path, expected[2].explain().path)
 
 
 def test_a_large_library_explains_too(shapes, tmp_path, monkeypatch):
@@ -153,6 +165,8 @@ def test_a_large_library_explains_too(shapes, tmp_path, monkeypatch):
     monkeypatch.setattr(recognize, "EXHAUSTIVE", 10)
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(demos, labels)
-        explained = library.recognize(demos[3:4])[0].explain()
+        answer = library.recognize(demos[3:4])[0]
+        explained = answer.explain()
+    np.testing.assert_allclose(answer.transform.scale, 1.0, atol=1e-3)  # the library is closed
     assert explained.nearest.label == labels[3]
     assert explained.nearest.differences.max() < 1e-3

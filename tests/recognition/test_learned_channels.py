@@ -191,15 +191,6 @@ def test_columns_of_the_same_names_are_what_was_learned_whatever_their_values_lo
     np.testing.assert_array_equal(learned.positions, of_joints(paths).positions)
 
 
-def test_angles_learned_without_a_unit_are_in_that_which_they_wrap_by(of_angles):
-    """Of radians, radians are learned: degrees that are asked for are converted to them."""
-    paths, labels = joints(seed=1)
-    degrees = tuple(one._replace(unit="deg", period=None) for one in JOINTS)
-    asked = of_joints([np.degrees(path) for path in paths], channels=degrees)
-    same(of_angles.recognize(asked), of_angles.recognize(of_joints(paths)))
-    assert of_angles.predict(asked).tolist() == labels
-
-
 def test_explanations_name_the_columns_that_were_learned_in_their_order():
     moved = ("speed", "load", "force", "torque")
     channels = tuple(Channel(name, "position", (name,)) for name in moved)

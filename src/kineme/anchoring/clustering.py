@@ -191,7 +191,7 @@ def _shared(clusters: Clusters, people: NDArray[np.intp] | None) -> bool:
 
 
 def spectral(similar: Array, n_clusters: int, min_members: int = 1) -> Clusters:
-    """Return `n_clusters` clusters of at least `min_members`, or as many as the movements fall into; -1 is none.
+    """Return `n_clusters` clusters of at least `min_members`, fewer if movements do not fall into so many; -1 is none.
 
     By average linkage of the cosines of entries in as many eigenvectors. Clusters of too few members are left over, and
     of the others the loosest is divided until there are enough.

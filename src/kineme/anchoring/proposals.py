@@ -237,7 +237,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
         Spectral clustering, in `n_clusters`; average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN),
         which find their number themselves.
     n_clusters : int, optional
-        Number of proposals, or as many as the movements fall into where these are fewer, of `min_members` each; with
+        Number of proposals, fewer where the movements do not fall into so many of `min_members` each; with
         "agglomerative" the number of clusters of the tree, those too small to be proposed included. By default it is
         found, by gaps between eigenvalues or by `count_clusters`, and is at least two: whether all movements are one
         cluster cannot be told from their own distances. Of two numbers that may be, "spectral" takes the larger: two

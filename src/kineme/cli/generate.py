@@ -62,16 +62,14 @@ def generate(**options: Any) -> None:
         raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
     given = {"start": options["start"], "goal": options["goal"], "obstacles": obstacles or None}
     points: dict[str, Any] = {name: None if point is None else np.array(point) for name, point in given.items()}
+    for name in ("start", "goal"):
+        checked_point(learned, points[name], f"--{name}")
+        points[name] = _in_turn(learned, points[name], name)
     movement_options = MovementOptions(**points, **{name: options[name] for name in ("duration", "rate", "settle")})
-    _, goal = (checked_point(learned, points[name], f"--{name}") for name in ("start", "goal"))
     movement = make(learned, movement_options)
     warn_of_bad_fit(learned)
-    if goal is not None and movement_options.settle is None:
-        _warn_of_missed_goal(learned, movement, goal)
-    for name, taken in () if goal is None else zip(_columns_of_goal(learned), goal.tolist(), strict=True):
-        asked = points["goal"][learned.moving_columns.index(name)]
-        if asked != taken:
-            write(f"note: {asked:g} of {printable(name)} is taken as {taken:g}, in the turn of the recording", err=True)
+    if movement_options.goal is not None and movement_options.settle is None:
+        _warn_of_missed_goal(learned, movement, movement_options.goal)
     if options["save"]:
         learned.primitive.save(options["save"])
     if options["plot"]:
@@ -91,10 +89,26 @@ def generate(**options: Any) -> None:
         write_movement(options["output"], movement.columns, movement.names)
 
 
-def _columns_of_goal(learned: Any) -> tuple[str, ...]:
-    """Return names of the columns of the primitive."""
+def _in_turn(learned: Any, point: Any, name: str) -> Any:
+    """Return a start or goal with angles in the turn in which the recording starts or ends, and say what is turned."""
+    import numpy as np
+
+    from kineme.dmp.recorded_as import primitive_columns, turns_beyond
+
     about = learned.primitive.to_recording
-    return tuple(learned.moving_columns if about is None else about.column_names)
+    if point is None or about is None:
+        return point
+    order, near = primitive_columns(about.moving), getattr(learned.primitive, f"{name}s")[0]
+    periods = about.periods(np.stack((point[order], near)))
+    turned = np.array(point, dtype=np.float64)
+    turned[order] -= turns_beyond(turned[order][None], near, periods)[0]
+    for column, asked, taken in zip(learned.moving_columns, point.tolist(), turned.tolist(), strict=True):
+        if asked != taken:
+            write(
+                f"note: --{name} {asked:g} of {printable(column)} is taken as {taken:g}, in the turn of the recording",
+                err=True,
+            )
+    return turned
 
 
 def warn_of_bad_fit(learned: Any) -> None:
@@ -112,11 +126,12 @@ def warn_of_bad_fit(learned: Any) -> None:
 
 
 def _warn_of_missed_goal(learned: Any, movement: Any, goals: Any) -> None:
-    """Say how far from a goal, in the columns of the primitive, a movement ends that still moves there."""
+    """Say how far from a goal a movement ends that still moves there, orientations aside."""
     about = learned.primitive.to_recording
-    turned = {name for channel in (about.orientations if about else ()) for name in channel.columns}
+    channels = about.moving if about else ()
+    turned = {name for channel in channels if channel.kind == "orientation" for name in channel.columns}
     misses = []
-    for name, goal in zip(_columns_of_goal(learned), goals, strict=True):
+    for name, goal in zip(learned.moving_columns, goals, strict=True):
         column = movement.columns["positions"][:, learned.columns.index(name)]
         if name not in turned and (extent := float(column.max() - column.min())) > 0.0:
             off = abs(float(column[-1]) - float(goal))

@@ -21,6 +21,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements, of_channels, samples_of
 from kineme.validation import Array
 
+_DEGREES = 360.0  # what angles without a unit wrap by that are too large for radians
+_NEAR = 0.125  # of a turn: joints with limits are at places farther apart than this in one turn
 _ROUNDING = 1e-9  # of a duration: shares that are equal but for rounding
 
 
@@ -63,25 +65,16 @@ class RecordedAs:
         """The channels that are orientations: the last columns of a primitive."""
         return tuple(channel for channel in self.moving if channel.kind == "orientation")
 
-    def turns(self, points: Array, near: Array | None = None) -> Array:
-        """Return whole turns (n, d) by which angles of points (n, d), columns of a primitive, are beyond `near` (d,).
+    def periods(self, points: Array) -> Array:
+        """Return what the columns (d,) of points (n, d) of a primitive wrap by; infinite if no angle, or if in doubt.
 
-        By default that is their mean direction, in the turn of their median. Turned are only angles that are then
-        within an eighth of a turn of it, of a mean all or none: joints with limits are at places far apart in one turn.
+        Small angles without a unit may be radians or degrees.
         """
-        turns = np.zeros(points.shape)
+        periods = np.full(points.shape[1], np.inf)
         for k, channel in enumerate(self.plain):
-            angles = points[:, k] if near is None else np.append(points[:, k], near[k])
-            if channel.kind != "angle" or not np.isfinite(period := period_of_channel(channel, angles)):
-                continue
-            if near is None:
-                mean = float(np.angle(np.exp(2j * np.pi * angles / period).sum())) * period / (2.0 * np.pi)
-                mean += period * np.round((np.median(angles) - mean) / period)
-            away = points[:, k] - (mean if near is None else near[k])
-            whole = period * np.round(away / period)
-            is_there = np.abs(away - whole) <= period / 8.0
-            turns[:, k] = np.where(is_there.all() if near is None else is_there, whole, 0.0)
-        return turns
+            period = period_of_channel(channel, points[:, k]) if channel.kind == "angle" else np.inf
+            periods[k] = period if channel.unit or channel.period or period == _DEGREES else np.inf
+        return periods
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -120,6 +113,27 @@ def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
         return None
     steps = [about.steps for about in recordings if about.steps is not None]
     return replace(recordings[0], steps=concatenated(steps) if len(steps) == len(recordings) else None)
+
+
+def turns_beyond(points: Array, near: Array, periods: Array) -> Array:
+    """Return whole turns (n, d) by which points are beyond `near` (d,); 0 where they lie farther than 1/8 from it."""
+    away = points - near
+    with np.errstate(invalid="ignore"):  # infinite periods
+        turns = np.where(np.isfinite(periods), periods * np.round(away / periods), 0.0)
+    return np.where(np.abs(away - turns) <= _NEAR * periods, turns, 0.0)
+
+
+def in_one_turn(starts: Array, about: RecordedAs) -> Array:
+    """Return whole turns (n, d) by which starts are beyond their mean direction, in the turn of their median.
+
+    0 in columns in which some start is farther from it than an eighth of a turn.
+    """
+    periods = about.periods(starts)
+    with np.errstate(invalid="ignore"):
+        mean = np.angle(np.exp(2j * np.pi * starts / periods).sum(axis=0)) * periods / (2.0 * np.pi)
+        mean += periods * np.round((np.median(starts, axis=0) - mean) / periods)
+        turns = turns_beyond(starts, mean, periods)
+        return np.where((np.abs(starts - turns - mean) > _NEAR * periods).any(axis=0), 0.0, turns)
 
 
 def primitive_columns(channels: Channels) -> list[int]:

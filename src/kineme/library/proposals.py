@@ -96,7 +96,7 @@ def propose(
         proposals = _behind(stored, proposals, free, len(chosen))
     if ids is None:
         rejected = [version.detail.get("movements", []) for version in in_effect(store) if version.action == "reject"]
-        now = read.returned_ids(store)
+        now = read.returned_ids(store) if rejected else {}
         members = ([now.get(key, key) for key in keys] for keys in rejected)
         proposals = _without(proposals, [np.flatnonzero(np.isin(chosen, keys)) for keys in members])
     return LibraryProposals(chosen, proposals)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, cast
 
@@ -113,12 +112,15 @@ class Answer:
     nearest: tuple[Neighbor, ...]
     responsibilities: Mapping[str, float]
     _rests_on: Rationale | None = field(default=None, repr=False)
+    _transform: Transform | None = field(default=None, repr=False)
 
-    @cached_property
+    @property
     def transform(self) -> Transform:
         """Map from the first of `nearest` onto the movement; computed when it is first asked for."""
-        rests_on = self._movements()
-        return rests_on.matches.transforms[rests_on.row]
+        if self._transform is None:
+            rests_on = self._movements("for its transform")
+            object.__setattr__(self, "_transform", rests_on.matches.transforms[rests_on.row])
+        return cast(Transform, self._transform)
 
     @property
     def promise(self) -> str:
@@ -218,18 +220,18 @@ class Answer:
         SpecificationError
             An answer that was sent to another process: it leaves the movements behind.
         """
-        return explain(self._movements(), self.in_words, dict(self.responsibilities))
+        return explain(self._movements("and explain that answer"), self.in_words, dict(self.responsibilities))
 
-    def _movements(self) -> Rationale:
+    def _movements(self, purpose: str) -> Rationale:
         if self._rests_on is None:
             raise SpecificationError(
                 "expected an answer as it was given, got one that was sent to another process without its movements; "
-                "recognize the movement again and explain that answer"
+                f"recognize the movement again {purpose}"
             )
         return self._rests_on
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"transform": self.transform, "_rests_on": None}
+        return vars(self) | {"_transform": self.transform, "_rests_on": None}
 
     def plot(self, movement: MovementLike | None = None, demonstrations: MovementsLike | None = None) -> Figure:
         """Draw the probabilities of the first ten classes, and the share of each representation in the similarity.
@@ -433,8 +435,8 @@ class KnownClasses:
         parts: dict[int, list[Answer]] = {}
 
         def answer(rows: slice, compared: Compared) -> None:
-            some = demos if len(compared) == len(demos) else demos[rows]
             verdicts = verdicts_of(compared, self.classifier, self.calibration, error_rate)
+            some = demos[rows]  # a copy, which is kept: callers may use their arrays again
             parts[rows.start] = answers_of(verdicts, comparison, references.demonstrations, some)
 
         for_compared(comparison, references, demos, answer)

@@ -82,7 +82,7 @@ class TwoStageSearch:
         held = HeldReferences(self.stored, self.comparison.similarity)
         step = max(_ASKED, min(_MOST_ASKED, _BOUNDS // len(self.stored.members)))
         for start in range(0, len(demos), step):
-            some = demos[start : start + step] if len(demos) > step else demos
+            some = demos[start : start + step]
             described = describe_tile(some, 0, len(some), self.comparison, self.comparison.procrustes)
             with single_threaded_blas():  # held once, not for each of many small products
                 verdicts = self._verdicts(described, held, error_rate)

@@ -46,6 +46,38 @@ def test_a_pause_of_any_length_may_have_no_samples(make_recording, by, seed, pau
     np.testing.assert_allclose(found.cuts, expected, atol=0.2)
 
 
+@pytest.mark.parametrize("pause", [0.5, 600.0])
+def test_shapes_that_start_slowly_after_a_pause_without_samples_are_apart(pause):
+    times, positions, now, place = [], [], 0.0, np.zeros(2)
+    for shape in kineme.load_lasa()[[5, 20, 33, 41, 55, 69]]:
+        times.append(shape.times[::10] + now)
+        positions.append((shape.positions - shape.positions[0])[::10] + place)
+        now, place = times[-1][-1] + pause, positions[-1][-1]
+    recording = Trajectory(np.concatenate(times), np.concatenate(positions))
+    starts, ends = [part[0] for part in times], [part[-1] for part in times]
+    np.testing.assert_allclose(kineme.segment(recording).cuts, np.column_stack((starts, ends)), atol=0.3)
+
+
+def test_a_long_pause_without_samples_leaves_points_to_change_points(make_recording):
+    pytest.importorskip("ruptures", reason="by='change-points' needs pip install kineme[segmentation]")
+    known = make_recording(3, n=4)
+    t, x = known.recording.times, known.recording.positions
+    later = np.where(t > known.truth[1, 1] + 0.2, 3600.0, 0.0)
+    cuts = kineme.segment(Trajectory(t + later, x), "change-points").cuts
+    np.testing.assert_allclose(cuts, known.truth + np.array([[0.0], [0.0], [3600.0], [3600.0]]), atol=0.5)
+
+
+@pytest.mark.parametrize("by", ["rest", "speed"])
+@pytest.mark.parametrize(("n", "step"), [(2, 1e-6), (3, 1e-6), (5, 1e-5), (10, 1e-4)])
+def test_samples_may_come_in_bursts(make_recording, by, n, step):
+    """Radio links send several samples at once, two sensors are stamped almost alike."""
+    known = make_recording(5, n=4).recording
+    burst = known.times[(np.arange(len(known)) // n) * n] + step * (np.arange(len(known)) % n)
+    even, bursts = (kineme.segment(Trajectory(t, known.positions), by) for t in (known.times, burst))
+    assert len(bursts) == len(even)
+    np.testing.assert_allclose(bursts.cuts, even.cuts, atol=0.25)
+
+
 @methods
 @given(seed=seeds, noise=st.sampled_from([0.0, 0.01]))
 def test_cover_loses_and_duplicates_no_sample(make_recording, by, seed, noise):

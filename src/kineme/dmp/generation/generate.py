@@ -62,7 +62,7 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
-        points = [(share, checked_point(learned, point, "a via point", share)) for share, point in options.via]
+        points = [(share, checked_point(learned, point, "a via point")) for share, point in options.via]
         via = tuple((share, point) for share, point in points if point is not None)
         move = _undisturbed if options.obstacles is None else _around_obstacles
         duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
@@ -81,12 +81,8 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     return Generated(movement, ColumnNames(learned.columns, learned.rates))
 
 
-def checked_point(learned: Learned, point: Array | None, name: str, share: float | None = None) -> Array | None:
-    """A start, a goal or a point at a share of the duration, in the columns that move, in those of the primitive.
-
-    Angles that are, but for whole turns, about where the demonstration is there are taken in its turn, see
-    `RecordedAs.turns`.
-    """
+def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
+    """A start or goal in the columns of the recording that move (columns,), in those of the primitive."""
     if point is None:
         return None
     names = learned.moving_columns
@@ -103,11 +99,7 @@ def checked_point(learned: Learned, point: Array | None, name: str, share: float
                 f"expected a unit quaternion for {', '.join(channel.columns)} of {name}, got norm {norm + 1.0:.6g}; "
                 "check the order of the columns, or divide it by its norm"
             )
-    if about is None:
-        return point
-    point, path = point[primitive_columns(about.moving)], learned.primitive.rollout().positions[0]
-    near = path[round((float(name == "goal") if share is None else share) * (len(path) - 1))]
-    return point - about.turns(point[None], near)[0]
+    return point if about is None else point[primitive_columns(about.moving)]
 
 
 def _signed(columns: Array, learned: Learned) -> Array:

@@ -23,7 +23,7 @@ from kineme.dmp.discrete.operators import encoder
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
-from kineme.dmp.recorded_as import merged
+from kineme.dmp.recorded_as import merged, turns_beyond
 from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -247,7 +247,10 @@ class AveragePrimitive:
     def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
         own = self.primitive
         same = parameters.of_kind(movements, own.dmp, own.n_dims, own.moving_channels, "the same")
-        return parameters.in_one_turn(same, own.starts[0])
+        if own.recorded_as is None:
+            return same
+        periods = own.recorded_as.periods(np.concatenate((own.starts, same.starts)))
+        return parameters.without_turns(same, turns_beyond(same.starts, own.starts[0], periods))
 
 
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:

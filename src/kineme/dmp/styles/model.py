@@ -150,7 +150,6 @@ class StyleModel:
         ours = None if self.recorded_as is None else self.recorded_as.moving
         remedy = "; pass the movements themselves and they are learned with it"
         primitives = parameters.of_kind(movements, self.dmp, len(self.mean), ours, "the model's own", remedy)
-        primitives = parameters.in_one_turn(primitives, self.mean[:, -3])
         rest = compared(self.metric, self.dmp, parameters.to_numbers(primitives) - self.mean)
         styles = rest @ (self.directions / np.sum(self.directions**2, axis=1, keepdims=True)).T  # they are orthogonal
         residuals = np.linalg.norm(rest - styles @ self.directions, axis=1)

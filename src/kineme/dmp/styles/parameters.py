@@ -28,7 +28,7 @@ from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_at
 from kineme.dmp.discrete.specification import Specification
-from kineme.dmp.recorded_as import RecordedAs
+from kineme.dmp.recorded_as import RecordedAs, in_one_turn
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
 from kineme.movements.channels.channel import Channels, check_alike
 from kineme.movements.trajectories.labels import label_array
@@ -63,19 +63,16 @@ def check_primitives(primitives: Any) -> None:
 
 
 def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None) -> Primitives:
-    """Primitives as they are; movements as `dmp`, by default ``DMP()``, learns them. Rhythms and poses are refused."""
+    """Primitives, angles in one turn; movements as `dmp`, by default ``DMP()``, learns them, no rhythms and poses."""
     if isinstance(movements, Batch):
         check_primitives(movements)
-    return in_one_turn(movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements))
-
-
-def in_one_turn(primitives: Primitives, near: Array | None = None) -> Primitives:
-    """Primitives whose angles start in the turn of `near` (d,), by default of their mean direction.
-
-    Each recording is unwrapped from its own first sample: those of one movement may be whole turns apart.
-    """
+    primitives = movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
     about = primitives.recorded_as
-    turns = np.zeros(1) if about is None or not len(primitives) else about.turns(primitives.starts, near)
+    return primitives if about is None else without_turns(primitives, in_one_turn(primitives.starts, about))
+
+
+def without_turns(primitives: Primitives, turns: Array) -> Primitives:
+    """Primitives less whole turns (n, d): each recording is unwrapped from its own first sample."""
     if not turns.any():
         return primitives
     return replace(primitives, starts=primitives.starts - turns, goals=primitives.goals - turns)

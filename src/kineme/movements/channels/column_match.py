@@ -13,7 +13,6 @@ import numpy as np
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.movements.channels.channel import Channels, recorded_names
-from kineme.movements.channels.coordinates import unit_by_period
 from kineme.movements.channels.detect import name_of, unit_of
 from kineme.movements.tables.columns import places_of
 from kineme.movements.tables.layout import Block, Detected, listed
@@ -58,10 +57,9 @@ class Columns(NamedTuple):
         return all(_NAMELESS.fullmatch(head.strip()) for head in self.heads)
 
 
-def columns_recorded(channels: Channels, by_period: bool = False) -> Columns:
-    """The columns of channels; `by_period` also says the unit of an angle that only what it wraps by tells."""
-    units = (unit_by_period(channel) if by_period else channel.unit for channel in channels for _ in channel.columns)
-    return Columns(recorded_names(channels), tuple(units))
+def columns_recorded(channels: Channels) -> Columns:
+    """The columns of channels."""
+    return Columns(recorded_names(channels), tuple(channel.unit for channel in channels for _ in channel.columns))
 
 
 def are_unknown(channels: Channels) -> bool:

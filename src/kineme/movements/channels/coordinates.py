@@ -168,11 +168,6 @@ def period_by_unit(unit: str | None) -> float | None:
     return float(_TURN / measure.size) if measure is not None and measure.quantity == "angle" else None
 
 
-def unit_by_period(channel: Channel) -> str | None:
-    """Return the unit of a channel, of an angle without one by what it wraps by."""
-    return channel.unit or {_TURN: "rad", 360.0: "deg"}.get(channel.period or 0.0)
-
-
 def period_of(angles: Array, unit: str | None) -> float:
     """The period of an angle: by its unit, or, where that says nothing, by its values.
 

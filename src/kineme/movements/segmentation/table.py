@@ -34,7 +34,7 @@ _PEAK_PATH = 0.9  # of the path is covered below the peak speed
 _MIN_SAMPLES = 8  # two movements of four samples
 _GLITCH = 3  # samples, at most: what leaves the path for longer is a movement
 _GLITCH_STEPS = 10.0  # distance of a glitch from the path, in the longest steps of the path beside it, at least
-_GAP = 10.0  # typical steps, at most, that pass on the clock between two samples
+_GAP = 10  # typical steps: a longer one is a gap
 _NOISE_EXTENTS = 4.0  # a smoothed recording rests if its extent is less than this many standard deviations of noise
 
 _MIN_REST, _MIN_BETWEEN = 0.035, 0.1  # of the typical duration of a movement
@@ -309,7 +309,7 @@ class Motion:
     """A recording, smoothed as much as its noise requires."""
 
     times: Array  # shape (T,)
-    clock: Array  # shape (T,); times from 0 on, but for what is longer than a step between samples
+    clock: Array  # shape (T,); times from 0 on, in which a gap counts as ten typical steps
     positions: Array  # shape (T, d); smoothed
     speed: Array  # shape (T,); norm of the derivative of the smoothed positions [unit/s]
     # Robust peak speed: nine tenths of the path are covered at lower speed. Weighted by path, not by time, so that
@@ -354,7 +354,7 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
         across = np.linalg.norm(smooth[gaps + 1] - smooth[gaps], axis=1) / steps[gaps]
         for beside in (gaps, gaps + 1):
             speed[beside] = np.minimum(speed[beside], across)
-        peak = weighted_quantile(speed, speed * np.gradient(clock), _PEAK_PATH)  # of the path
+        peak = weighted_quantile(speed, speed * np.gradient(t), _PEAK_PATH)  # of the path
         noise = float(np.sqrt(passed * cutoff**3))
         aim = resolution * peak / 4.0
         if noise <= 1.05 * aim or cutoff <= slowest:
@@ -370,8 +370,13 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
 
 
 def _longest_step(steps: Array) -> float:
-    """Return how long a step between two samples may be before it is a gap."""
-    return _GAP * float(np.median(steps))
+    """Return how long a step between two samples may be before it is a gap: typically, ten of them take no longer.
+
+    The median of ten together: samples may come in bursts.
+    """
+    t = np.append(0.0, np.cumsum(steps))
+    k = min(_GAP, len(steps))
+    return max(float(np.median(t[k:] - t[:-k])), _GAP * float(np.median(steps)))
 
 
 def steps_of(recording: Trajectory) -> Array:

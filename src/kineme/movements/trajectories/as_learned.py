@@ -10,7 +10,7 @@ import numpy as np
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, in_words, is_plain, moving_kinds, recorded_names, same_columns
 from kineme.movements.channels.column_match import are_unknown, columns_like, columns_recorded, conversion, may_be
-from kineme.movements.channels.coordinates import lever_of, unit_by_period
+from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.layout import listed
 from kineme.movements.trajectories.demonstrations import Demonstrations, one_by_one
 from kineme.movements.trajectories.movements import in_coordinates, of_channels
@@ -110,7 +110,7 @@ def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
 def by_names(demos: Demonstrations, learned: Channels, known_units: bool = True) -> Demonstrations:
     """Movements whose channels have the names of `learned`, in that order and unit, and of those kinds."""
     raw = as_recorded(demos)
-    ours, wanted = columns_recorded(demos.channels or ()), columns_recorded(learned, by_period=not known_units)
+    ours, wanted = columns_recorded(demos.channels or ()), columns_recorded(learned)
     positions = np.ascontiguousarray(columns_like(raw.positions, ours, wanted, known_units))
     return of_columns(Demonstrations.of_movements(replace(raw.movements, positions=positions), demos.steps), learned)
 
@@ -157,6 +157,6 @@ def _in_units(demos: Demonstrations, learned: Channels) -> Demonstrations:
         columns = slice(k, k := k + len(channel.coordinates))
         if channel.kind == "orientation":
             positions[:, columns] *= ratio
-        elif (sizes := conversion(channel.name, channel.unit, unit_by_period(other), known_units=False)) is not None:
+        elif (sizes := conversion(channel.name, channel.unit, other.unit, known_units=False)) is not None:
             positions[:, columns] = converted(positions[:, columns], *sizes)
     return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)
