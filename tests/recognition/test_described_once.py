@@ -61,17 +61,16 @@ def test_what_is_not_compared_in_detail_is_not_smoothed_in_detail(monkeypatch):
         assert (counts.smoothed, counts.detailed) == (len(shapes), 0)
 
 
-def test_an_answer_smooths_each_movement_and_each_example_once(asked, monkeypatch):
-    """The map from the nearest demonstration takes the paths that were described; those of examples are made.
-
-    Nothing of it needs details.
-    """
+def test_an_answer_smooths_each_movement_once_and_again_with_each_example_for_all_transforms(asked, monkeypatch):
+    """Most answers are not asked for the map from the nearest demonstration, which needs no details."""
     recognizer, movements = asked
     counts = _Counts(monkeypatch)
     answers = recognizer.recognize(movements)
     examples = {one.nearest[0].index for one in answers}
+    assert (counts.smoothed, counts.detailed, counts.described) == (len(movements),) * 3
+    assert len([one.transform for one in answers]) == len(movements)
     assert counts.described == len(movements)
-    assert counts.smoothed == len(movements) + len(examples)
+    assert counts.smoothed == 2 * len(movements) + len(examples)
     assert counts.detailed == len(movements)
 
 

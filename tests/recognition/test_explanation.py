@@ -11,6 +11,7 @@ import pytest
 
 import kineme
 from kineme.errors import SpecificationError
+from kineme.library.recognize import LibraryRecognizer
 
 
 @pytest.fixture(scope="module")
@@ -158,14 +159,11 @@ def test_what_an_answer_computes_later_is_of_the_movement_that_was_asked(shapes)
     np.testing.assert_array_equal(answers[2].explain().path, expected[2].explain().path)
 
 
-def test_a_large_library_explains_too(shapes, tmp_path, monkeypatch):
-    from kineme.library import recognize
-
+def test_a_large_library_explains_too(shapes, tmp_path):
     demos, labels = shapes
-    monkeypatch.setattr(recognize, "EXHAUSTIVE", 10)
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(demos, labels)
-        answer = library.recognize(demos[3:4])[0]
+        answer = LibraryRecognizer(library.store, exhaustive=10).recognize(demos[3:4])[0]
         explained = answer.explain()
     np.testing.assert_allclose(answer.transform.scale, 1.0, atol=1e-3)  # the library is closed
     assert explained.nearest.label == labels[3]
