@@ -139,7 +139,7 @@ def _strangers() -> str:
 
 
 def _answers() -> str:
-    """What one label and one whole answer take, beside the rival of each set."""
+    """What a label, an answer, and one with its transform take, beside the rival of each set."""
     lines = ["| one movement | kineme [ms] | rival [ms] | times as fast |", "|---|---|---|---|"]
     lines += [
         f"| {row['what']} | {row['ours']:.1f} | {row['peer']:.1f}, {row['peer_name']} | {row['ratio']:.2f} |"
