@@ -6,6 +6,7 @@ import io
 import json
 import os
 import zlib
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -219,7 +220,7 @@ def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
     assert again == expected
     assert len(computed) == 1
     assert (calibration.between, calibration.exponent) == (read.between, read.exponent) != (0.0, EXPONENT)
-    for name in vars(calibration).keys() - {"between", "exponent"}:
+    for name in {field.name for field in fields(calibration)} - {"between", "exponent"}:
         for array, other in zip(getattr(calibration, name), getattr(read, name), strict=True):
             np.testing.assert_array_equal(array, other)
     (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(b"spoiled")

@@ -159,7 +159,7 @@ def test_processes_learn_it_too(archive, one, tmp_path, small_pieces):
     rows, said = by_pieces(tmp_path / "library", [archive], by=[("--workers", 2)])
     assert_same(rows, one)
     assert (said["added"], said["duplicates"], said["without_symbol"]) == (30, 1, 0)
-    assert said["kept"] == [{"symbol": "zig", "label": "arc", "movements": 1}]  # the copy, in another folder
+    assert said["kept"] == [{"symbol": "arc", "label": "zig", "movements": 1}]  # the copy, in a folder read later
     assert sorted(said["symbols"]) == ["arc", "line", "wave", "zig"]
 
 
