@@ -544,6 +544,19 @@ def _one_after_the_other():
     return "time,x,y,z\n" + "".join(f"{t:.4f},{x:.4f},{y:.4f},0\n" for t, x, y in rows)
 
 
+def test_nothing_moves_under_the_hand_when_the_shapes_of_a_recording_come(opened, studio, folder):
+    page = opened(studio(folder))
+    late = []
+    page.route("**/shapes", lambda route: [late.append(route)])
+    page.evaluate(DROP, ["letters.csv", _one_after_the_other()])
+    wait_for_text(page, "#recording-name", "letters.csv")
+    shown = page.locator("#channels").bounding_box()
+    wait_until(page, "window.unanswered > 0")
+    late[0].continue_()
+    wait_until(page, "document.getElementById('shape-name').textContent !== ''")
+    assert page.locator("#channels").bounding_box() == shown
+
+
 def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, tmp_path):
     name = "two letters <b>.csv"
     page = opened(studio(make_letters(tmp_path / "letters")), tolerated=("400",))
@@ -551,8 +564,7 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     wait_until(page, "document.getElementById('drop-state').textContent.startsWith('notes.pdf: expected a file')")
     page.evaluate(DROP, [name, _one_after_the_other()])
     wait_for_text(page, "#recording-name", name)
-    # Chosen at first are as many as the library's movements have. By the key, which no change of the layout misleads.
-    page.locator("#channels input").nth(2).press("Space")
+    page.locator("#channels input").nth(2).check()  # chosen at first are as many as the library's movements have
     assert page.is_disabled("#spot")
     assert page.inner_text("#channels-note") == "Movements of this library have 2 columns; 3 are chosen. Choose 2."
     page.locator("#channels input").nth(2).uncheck()

@@ -12,7 +12,7 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from browser_samples import ANSWERED, PIXELS, SHOWN, Hand, center, letters, make_letters, wait_for_text
+from browser_samples import ANSWERED, PIXELS, SHOWN, Hand, center, letters, make_letters, settle, wait_for_text
 from studio_samples import BEARER, ROOT
 
 import kineme
@@ -90,10 +90,15 @@ def test_a_finger_on_a_phone_draws_in_the_studio(opened, phone):
     wait_until(phone, "document.getElementById('wand-note').textContent.endsWith('GShape')")
     _touch(phone, np.array([x + 60, y - 60]) + _path(shape="Angle") * [150, -150])  # the next one follows
     wait_until(page, f"document.querySelector('{FIRST}').textContent === 'Angle'")
+    late = []  # the answer to what is asked when the dialog opens: the phone still draws
+    page.route("**/api/wand", lambda route: late.append(route) if route.request.method == "GET" else route.continue_())
     page.click("#draw-phone")
-    wait_for_text(page, "#phone-go", "Disconnect")
+    wait_until(page, "window.unanswered === 1")
     page.click("#phone-go")
     wait_for_text(page, "#phone-go", "Connect a phone")
+    late[0].fulfill(json={"address": phone.url, "picture": "data:,", "fingerprint": ""})
+    settle(page)
+    assert page.inner_text("#phone-go") == "Connect a phone"
     wait_until(page, "document.querySelectorAll('#sources li').length === 0")
     wait_until(phone, "document.getElementById('wand-note').textContent.startsWith('No longer connected')")
 

@@ -6,9 +6,13 @@ import { canvasHeight } from "./scale.js";
 
 const PATH = "/api/wand";
 
-/** The address is none where the studio does not listen for a phone. */
+let asked; // last: the answer to an earlier question may come later
+
+/** The address is none where the studio does not listen. */
 async function showAddress(answer) {
+  asked = answer;
   const { address, picture, fingerprint, error } = await answer.catch((error) => ({ error }));
+  if (asked !== answer) return;
   write(byId("phone-problem"), error?.message ?? "");
   if (error) return;
   byId("phone-ask").hidden = Boolean(address);
