@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from kineme import DMP, Demonstrations
 from kineme.dmp import Contextual
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.styles import average, learn_styles
@@ -68,3 +69,15 @@ def test_small_angles_without_a_unit_may_be_degrees_and_stay():
 def test_joints_with_limits_that_come_from_far_apart_are_averaged_as_they_stand(starts):
     mean = average(DMP().learn(turning(starts, wrapped=False)))
     assert mean.primitive.starts[0, 1] == pytest.approx(np.mean(starts), abs=1e-9)
+
+
+def test_quaternions_before_an_angle_do_not_hide_it():
+    channels = (
+        Channel("tip", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
+        Channel("yaw", "angle", ("yaw",), "deg"),
+    )
+    about = RecordedAs(channels)
+    of_a_library = np.array([[0.0, 0.0, 0.0, 175.0], [0.0, 0.0, 0.0, -175.0]])  # turns about x, y and z, and the angle
+    assert about.periods(of_a_library).tolist() == [np.inf, np.inf, np.inf, 360.0]
+    of_poses = np.array([[175.0, 1.0, 0.0, 0.0, 0.0], [-175.0, 1.0, 0.0, 0.0, 0.0]])
+    assert about.periods(of_poses).tolist() == [360.0, *[np.inf] * 4]

@@ -211,7 +211,9 @@ def test_the_nearest_place_is_inside_and_what_is_inside_stays(demonstrations, re
     rows = np.array(demonstrations)
     starts, goals = rows[:, :2], rows[:, 2:]
     durations = np.ones(len(rows))
-    skill = Skill("s", "sym-1", "", np.arange(len(rows)), starts, goals, durations, ("x", "y"), ("m", None))
+    skill = Skill(
+        "s", "sym-1", "", np.arange(len(rows)), starts, goals, durations, ("x", "y"), ("m", None), np.full(2, np.inf)
+    )
     start, goal = np.array(request[:2]), np.array(request[2:])
     begin, end = nearest_inside(skill, start, goal)
     assert outside(skill, begin, end) == []

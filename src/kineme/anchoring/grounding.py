@@ -15,7 +15,7 @@ from kineme.dmp.batch import check_array, specification_from_dict, specification
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.styles.average import AveragePrimitive, average
 from kineme.dmp.styles.model import StyleModel, compared, learn_styles
-from kineme.dmp.styles.parameters import check_primitives
+from kineme.dmp.styles.parameters import as_primitives, check_primitives
 from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.similarity.describe import Described, Maps, describe, maps_onto, moved, paths_of
@@ -88,6 +88,7 @@ def ground(
     check_choice("by", by, ["medoid", "mean"])
     if not len(primitives):
         raise TrajectoryError(f"expected at least one demonstration of {symbol.name!r}, got none")
+    primitives = as_primitives(primitives)
     d = primitives.n_dims
     named = None if units is None else [units] * d if isinstance(units, str) else list(units)
     if named is not None and len(named) != d:

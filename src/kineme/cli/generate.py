@@ -93,7 +93,8 @@ def _in_turn(learned: Any, point: Any, name: str) -> Any:
     """Return a start or goal with angles in the turn in which the recording starts or ends, and say what is turned."""
     import numpy as np
 
-    from kineme.dmp.recorded_as import primitive_columns, turns_beyond
+    from kineme.dmp.recorded_as import primitive_columns
+    from kineme.movements.channels.coordinates import turns_beyond
 
     about = learned.primitive.to_recording
     if point is None or about is None:

@@ -22,7 +22,6 @@ from kineme.movements.trajectories.movements import Movements, of_channels, samp
 from kineme.validation import Array
 
 _DEGREES = 360.0  # what angles without a unit wrap by that are too large for radians
-_NEAR = 0.125  # of a turn: joints with limits are at places farther apart than this in one turn
 _ROUNDING = 1e-9  # of a duration: shares that are equal but for rounding
 
 
@@ -70,8 +69,11 @@ class RecordedAs:
 
         Small angles without a unit may be radians or degrees.
         """
-        periods = np.full(points.shape[1], np.inf)
-        for k, channel in enumerate(self.plain):
+        periods, names = np.full(points.shape[1], np.inf), learned_names(self.channels)
+        if len(names) != len(periods):  # orientations are quaternions, behind the others
+            names = learned_names(self.plain)
+        for channel in self.plain:
+            k = names.index(channel.coordinates[0])
             period = period_of_channel(channel, points[:, k]) if channel.kind == "angle" else np.inf
             periods[k] = period if channel.unit or channel.period or period == _DEGREES else np.inf
         return periods
@@ -113,27 +115,6 @@ def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
         return None
     steps = [about.steps for about in recordings if about.steps is not None]
     return replace(recordings[0], steps=concatenated(steps) if len(steps) == len(recordings) else None)
-
-
-def turns_beyond(points: Array, near: Array, periods: Array) -> Array:
-    """Return whole turns (n, d) by which points are beyond `near` (d,); 0 where they lie farther than 1/8 from it."""
-    away = points - near
-    with np.errstate(invalid="ignore"):  # infinite periods
-        turns = np.where(np.isfinite(periods), periods * np.round(away / periods), 0.0)
-    return np.where(np.abs(away - turns) <= _NEAR * periods, turns, 0.0)
-
-
-def in_one_turn(starts: Array, about: RecordedAs) -> Array:
-    """Return whole turns (n, d) by which starts are beyond their mean direction, in the turn of their median.
-
-    0 in columns in which some start is farther from it than an eighth of a turn.
-    """
-    periods = about.periods(starts)
-    with np.errstate(invalid="ignore"):
-        mean = np.angle(np.exp(2j * np.pi * starts / periods).sum(axis=0)) * periods / (2.0 * np.pi)
-        mean += periods * np.round((np.median(starts, axis=0) - mean) / periods)
-        turns = turns_beyond(starts, mean, periods)
-        return np.where((np.abs(starts - turns - mean) > _NEAR * periods).any(axis=0), 0.0, turns)
 
 
 def primitive_columns(channels: Channels) -> list[int]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.dmp.styles.parameters import as_primitives, without_turns
 from kineme.errors import SpecificationError
 from kineme.library.calibration_cache import calibrated, calibrated_once, sample_comparison
 from kineme.library.members import Members, described_references, groups_of, members_of, some_of_each
@@ -18,6 +19,7 @@ from kineme.library.reduced_features_cache import ReducedMovements, open_cache
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
+from kineme.movements.channels.coordinates import turns_beyond
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, Calibrates, KnownClasses, Neighbor, fit_known_classes, is_one
 from kineme.recognition.classifiers import by_kernels
@@ -185,5 +187,16 @@ def monitor(
     noise = jitter(demos) if noise is None else noise
     if all(end is None for end in ends):
         return Monitor.of(demos, groups, error_rate=error_rate, noise=noise, stream=stream)
-    paths = read.primitives(store, ids).rollout(*ends).positions
-    return Monitor(corridor(paths, groups, error_rate, noise, relative=False), store.channels, stream)
+    primitives = as_primitives(read.primitives(store, ids))
+    primitives = as_primitives(read.primitives(store, ids))
+    about = primitives.recorded_as
+    periods = None if about is None else about.periods(primitives.starts)
+    if periods is not None:  # the start that is asked for, or the goal, may be in another turn
+        begins = ends[0] is not None
+        typical = np.median(primitives.starts if begins else primitives.goals, axis=0)
+        asked = np.asarray(ends[0] if begins else ends[1], dtype=np.float64)
+        if asked.shape == typical.shape:
+            turns = np.broadcast_to(turns_beyond(typical[None], asked, periods), primitives.starts.shape)
+            primitives = without_turns(primitives, turns)
+    shown = corridor(primitives.rollout(*ends).positions, groups, error_rate, noise, relative=False)
+    return Monitor(shown, store.channels, stream, periods)

@@ -124,10 +124,12 @@ def nearest_inside(skill: Skill, start: Array, goal: Array) -> tuple[Array, Arra
     There is such a goal: axis by axis, a start inside is a mean of two that were shown, and the mean of their goals has
     the mean of their displacements.
     """
-    begin = np.clip(start, skill.starts.min(axis=0), skill.starts.max(axis=0))
+    turns = skill.turns(start)
+    begin = np.clip(start - turns, skill.starts.min(axis=0), skill.starts.max(axis=0))
     goals, ways = skill.goals, skill.shown["displacement"]
     low = np.maximum(goals.min(axis=0), begin + ways.min(axis=0))
-    return begin, np.clip(goal, low, np.minimum(goals.max(axis=0), begin + ways.max(axis=0)))
+    end = np.clip(goal - turns, low, np.minimum(goals.max(axis=0), begin + ways.max(axis=0)))
+    return begin + turns, end + turns
 
 
 def check_inside(skill: Skill, start: Array, goal: Array, duration: float) -> None:
@@ -195,8 +197,9 @@ def plan_symbol(library: ActionLibrary, robot: Robot, who: str, joints: Array) -
     """Return a checked movement of a symbol as it was demonstrated nearest to where the arm stands with `joints`."""
     skill = skill_of(library, who)
     here = standing_place(library, skill, robot, joints)
-    row = 0 if here is None else int(np.linalg.norm(skill.starts - here, axis=1).argmin())
-    start, goal, duration = skill.starts[row], skill.goals[row], float(skill.durations[row])
+    turns = 0.0 if here is None else skill.turns(here)
+    row = 0 if here is None else int(np.linalg.norm(skill.starts + turns - here, axis=1).argmin())
+    start, goal, duration = skill.starts[row] + turns, skill.goals[row] + turns, float(skill.durations[row])
     shown = preview_skill(library, skill, robot, joints, start, goal, duration)
     if shown.movement is None:
         raise TrajectoryError(shown.refusal)

@@ -11,10 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.dmp.discrete.rollout import Rollout
 from kineme.dmp.pose.pose_rollout import PoseRollout
+from kineme.dmp.recorded_as import primitive_columns
+from kineme.dmp.styles.parameters import as_primitives
 from kineme.errors import SpecificationError
 from kineme.library.grounding import learned_movement
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import Channels, learned_names
+from kineme.movements.channels.coordinates import turns_beyond
 from kineme.validation import Array, as_point, check_number
 
 _GRIPPERS = ("grip", "grasp", "finger")
@@ -26,6 +29,7 @@ class Skill:
 
     - `movements` (n,): their ids in the library. `starts`, `goals` (n, k). `durations` (n,) [s].
     - `axes`, `units`: names of the k coordinates and their units, None where the recordings do not say it.
+    - `periods` (k,): what angles wrap by, which are in one turn; infinite of other coordinates.
     """
 
     name: str
@@ -37,11 +41,16 @@ class Skill:
     durations: Array
     axes: tuple[str, ...]
     units: tuple[str | None, ...]
+    periods: Array
 
     @property
     def shown(self) -> dict[str, Array]:
         """Start, goal and displacement of each movement, (n, k)."""
         return {"start": self.starts, "goal": self.goals, "displacement": self.goals - self.starts}
+
+    def turns(self, place: Array, what: str = "start") -> Array:
+        """Return whole turns (k,) by which a start or goal is beyond those that were shown; see `turns_beyond`."""
+        return np.asarray(turns_beyond(place[None], np.median(self.shown[what], axis=0), self.periods)[0])
 
 
 class Excess(NamedTuple):
@@ -75,11 +84,13 @@ def skill_of(library: ActionLibrary, who: str) -> Skill:
     symbol = library[who]
     if not len(symbol):
         raise SpecificationError(f"expected a symbol with movements, {symbol.name!r} has none; learn some")
-    primitives = library.primitives(ids=symbol.members)
+    primitives = as_primitives(library.primitives(ids=symbol.members))
     columns, axes, units = place_columns(library.channels, primitives.n_dims)
+    about = primitives.recorded_as
+    periods = np.full(primitives.n_dims, np.inf) if about is None else about.periods(primitives.starts)
     return Skill(
         symbol.name, symbol.id, symbol.description, symbol.members, primitives.starts[:, columns],
-        primitives.goals[:, columns], primitives.durations, axes, units,
+        primitives.goals[:, columns], primitives.durations, axes, units, periods[columns],
     )  # fmt: skip
 
 
@@ -109,10 +120,10 @@ def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0
     """List what lies outside the box of starts, goals and displacements that were shown; empty if nothing does.
 
     Start and goal (k,) are places in the unit of the recordings. The boxes are larger by `margin` on every side, in
-    that unit.
+    that unit. Angles of both are taken less the whole turns by which the start is beyond those that were shown.
     """
     check_number("margin", margin, least=0.0)
-    begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
+    begin, end = _in_turn(skill, start, goal)
     excesses = []
     for (what, shown), value in zip(skill.shown.items(), (begin, end, end - begin), strict=True):
         low, high = shown.min(axis=0) - margin, shown.max(axis=0) + margin
@@ -126,9 +137,16 @@ def outside(skill: Skill, start: ArrayLike, goal: ArrayLike, margin: float = 0.0
 
 def nearest_demonstration(skill: Skill, start: ArrayLike, goal: ArrayLike) -> int:
     """Return the row of the movement that went most nearly so: by displacement and, if equal, by start."""
-    begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
+    begin, end = _in_turn(skill, start, goal)
     ways = np.linalg.norm(skill.goals - skill.starts - (end - begin), axis=1)
     return int(np.lexsort((np.linalg.norm(skill.starts - begin, axis=1), ways.round(9)))[0])
+
+
+def _in_turn(skill: Skill, start: ArrayLike, goal: ArrayLike) -> tuple[Array, Array]:
+    """Return start and goal (k,), angles in the turn in which they were shown."""
+    begin, end = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
+    turns = skill.turns(begin)
+    return begin - turns, end - turns
 
 
 def move_to(
@@ -151,6 +169,8 @@ def move_to(
     channels = primitive.to_recording.moving if primitive.to_recording is not None else None
     names = skill.axes if channels is None else learned.moving_columns
     columns = [names.index(axis) for axis in skill.axes]
+    if channels is not None:  # orientations of a primitive are its last columns
+        columns = np.argsort(primitive_columns(channels))[columns].tolist()
     first, last = primitive.starts[0].copy(), primitive.goals[0].copy()
     first[columns], last[columns] = as_point("start", start, skill.axes), as_point("goal", goal, skill.axes)
     rest = np.zeros(primitive.n_dims)

@@ -176,6 +176,10 @@ class SkillTools:
         start = np.array([arguments.get(f"start_{axis}", None if here is None else here[k])
                           for k, axis in enumerate(axes)], dtype=float)  # fmt: skip
         goal = np.array([arguments[f"goal_{axis}"] for axis in axes], dtype=float)
+        if here is not None:  # ranges are in the turn that was shown, the movement in that of the arm
+            is_given = np.isin([f"start_{axis}" for axis in axes], list(arguments))
+            goal += skill.turns(here) - np.where(is_given, skill.turns(start), skill.turns(goal, "goal"))
+            start += skill.turns(here) - skill.turns(start)
         usual = skill.durations[nearest_demonstration(skill, start, goal)]
         duration = float(arguments.get("duration", usual))
         return previews.preview_skill(self.library, skill, self.robot, self.joints, start, goal, duration)

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import turns_beyond
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -320,13 +321,19 @@ class Execution(NamedTuple):
 class Monitor:
     """Follow one execution of a movement, sample by sample; `kineme.ActionLibrary.monitor` or `of` makes it.
 
-    Nothing that arrives raises; what cannot be used is skipped, counted and flagged, as by `Live`.
+    Nothing that arrives raises; what cannot be used is skipped, counted and flagged, as by `Live`. Where the corridor
+    is in absolute positions, angles with one of `periods` (d,) are taken in the turn in which it begins.
     """
 
     def __init__(
-        self, shown: Corridor, channels: Channels | None = None, stream: Callable[[], Live] | None = None
+        self,
+        shown: Corridor,
+        channels: Channels | None = None,
+        stream: Callable[[], Live] | None = None,
+        periods: Array | None = None,
     ) -> None:
         self.shown = shown
+        self._periods = np.full(shown.spread.mean.shape[1] // 2, np.inf) if periods is None else periods
         self._step, n_dims = shown.spread.step, shown.spread.mean.shape[1] // 2
         self._stream = stream
         self._live: Live | None = None
@@ -399,7 +406,8 @@ class Monitor:
     def _take(self, time: float, position: Array) -> None:
         """Go as many steps towards a position as fit, and measure the distance at each."""
         if self._origin is None:
-            self._origin = position if self.shown.relative else np.zeros_like(position)
+            begin = self.shown.spread.mean[0, : len(position)]
+            self._origin = position if self.shown.relative else turns_beyond(position[None], begin, self._periods)[0]
             self._last = position - self._origin
             self._recent = [self._last] * (_LAG + 1)
             self._measure(time)

@@ -23,9 +23,10 @@ from kineme.dmp.discrete.operators import encoder
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
 from kineme.dmp.discrete.specification import Specification
 from kineme.dmp.discrete.via_points import ViaLike
-from kineme.dmp.recorded_as import merged, turns_beyond
+from kineme.dmp.recorded_as import merged
 from kineme.dmp.styles import parameters
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.coordinates import turns_beyond
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 

@@ -28,9 +28,10 @@ from kineme.dmp.batch import Batch
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.operators import Response, condition, decoder, decoder_at
 from kineme.dmp.discrete.specification import Specification
-from kineme.dmp.recorded_as import RecordedAs, in_one_turn
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
 from kineme.movements.channels.channel import Channels, check_alike
+from kineme.movements.channels.coordinates import in_one_turn
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import LARGEST, Array, as_numbers
@@ -68,7 +69,11 @@ def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None)
         check_primitives(movements)
     primitives = movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
     about = primitives.recorded_as
-    return primitives if about is None else without_turns(primitives, in_one_turn(primitives.starts, about))
+    return (
+        primitives
+        if about is None
+        else without_turns(primitives, in_one_turn(primitives.starts, about.periods(primitives.starts)))
+    )
 
 
 def without_turns(primitives: Primitives, turns: Array) -> Primitives:

@@ -23,6 +23,8 @@ _UNSTEADY = 3.0  # a step through the border is at most so many times the longes
 _UNEVEN = 0.01  # of a period: by so much an angle that turns evenly steps differently through the border, if rounded
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
 
+_NEAR = 0.125  # of a period: joints with limits are at places farther apart than this in one turn
+
 _LEVER = 0.2
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
@@ -207,3 +209,23 @@ def _steps(values: Array, offsets: NDArray[np.intp]) -> Array:
     steps = np.diff(values)
     steps[offsets[1:-1] - 1] = 0.0
     return steps
+
+
+def turns_beyond(points: Array, near: Array, periods: Array) -> Array:
+    """Return whole turns (n, d) by which points are beyond `near` (d,); 0 where they lie farther than 1/8 from it."""
+    away = points - near
+    with np.errstate(invalid="ignore"):  # infinite periods
+        turns = np.where(np.isfinite(periods), periods * np.round(away / periods), 0.0)
+    return np.where(np.abs(away - turns) <= _NEAR * periods, turns, 0.0)
+
+
+def in_one_turn(starts: Array, periods: Array) -> Array:
+    """Return whole turns (n, d) by which starts are beyond their mean direction, in the turn of their median.
+
+    0 in columns in which some start is farther from it than an eighth of a turn.
+    """
+    with np.errstate(invalid="ignore"):
+        mean = np.angle(np.exp(2j * np.pi * starts / periods).sum(axis=0)) * periods / (2.0 * np.pi)
+        mean += periods * np.round((np.median(starts, axis=0) - mean) / periods)
+        turns = turns_beyond(starts, mean, periods)
+        return np.where((np.abs(starts - turns - mean) > _NEAR * periods).any(axis=0), 0.0, turns)
