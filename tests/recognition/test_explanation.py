@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +32,18 @@ def test_a_movement_that_is_its_example_differs_nowhere(shapes):
     assert explained.nearest.differences.max() < 1e-6
     np.testing.assert_allclose(explained.nearest.path, explained.path, atol=1e-5 * np.ptp(explained.path))
     assert f"the same as an example of {labels[0]}" in explained.in_words
+
+
+def test_an_example_that_was_turned_is_not_the_same():
+    u = np.linspace(0, 1, 60)
+    swipe = np.column_stack((u, 0.1 * np.sin(np.pi * u)))
+    demos = [kineme.Trajectory(u, size * swipe) for size in (0.9, 1.0, 1.1, -0.9, -1.0, -1.1)]
+    explained = kineme.Recognizer().fit(demos, ["right"] * 3 + ["left"] * 3).recognize(demos[1]).explain()
+    assert explained.nearest.turned == pytest.approx(0.0, abs=1e-6)
+    assert abs(explained.runner_up.turned) == pytest.approx(180.0, abs=1e-6)
+    assert "the same as an example of right;" in explained.in_words
+    assert re.search(r"an example of left turned by -?180 degrees$", explained.in_words)
+    assert explained.to_dict()["runner_up"]["turned"] == explained.runner_up.turned
 
 
 def test_where_a_movement_leaves_its_example_is_said(shapes):
@@ -74,7 +87,8 @@ def test_every_number_of_dimensions_is_drawn(make_movement, n_dims):
     arrays = [make_movement(seed, n_dims)[1] for seed in (0, 1, 0, 1)]
     recognizer = kineme.Recognizer().fit(arrays[:2], ["a", "b"])
     figure = recognizer.recognize(arrays[2]).explain().plot()
-    assert [axes.get_title().split(",")[0] for axes in figure.axes[:2]] == ["nearest: a", "next in rank: b"]
+    titles = [axes.get_title().partition(",")[0].partition(" turned")[0] for axes in figure.axes[:2]]
+    assert titles == ["nearest: a", "next in rank: b"]
 
 
 def read_columns(folder, heads, arrays):

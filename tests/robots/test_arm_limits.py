@@ -143,3 +143,12 @@ def test_velocities_and_accelerations_are_derivatives_also_in_slowed_ramps():
     moving = t.times > made.begins + 0.01
     changes = np.gradient(t.velocities, t.times, axis=0)[moving][1:-1]
     np.testing.assert_allclose(changes, t.accelerations[moving][1:-1], atol=0.1)
+
+
+def test_an_arm_that_holds_still_takes_its_own_time():
+    robot, t = load("panda"), np.linspace(0, 2, 101)
+    still = kineme.Trajectory(t, np.tile(robot.rest, (101, 1)))
+    own, quick = (move(still, robot, space="joints", timing=timing, steps={"gripper": (t > 1) * 1.0})
+                  for timing in ("generated", "fastest"))  # fmt: skip
+    assert quick.preflight.passed
+    assert quick.trajectory.duration == pytest.approx(own.trajectory.duration)

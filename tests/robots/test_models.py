@@ -184,6 +184,21 @@ def test_a_mimic_joint_is_refused_by_name(tmp_path):
         load(path)
 
 
+def test_soft_limits_of_a_safety_controller_are_kept(tmp_path):
+    path = tmp_path / "arm.urdf"
+    limits = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+    for soft, expected in (
+        ('soft_lower_limit="-0.5" soft_upper_limit="0.25"', (-0.5, 0.25)),
+        ('soft_lower_limit="-3" soft_upper_limit="3"', (-1.0, 1.0)),
+        ('soft_upper_limit="0.5"', (-1.0, 0.5)),
+    ):
+        more = f'{limits}<safety_controller {soft} k_position="10" k_velocity="10"/>'
+        path.write_text(ONE_JOINT.format(kind="revolute", more=more))
+        robot = load(path)
+        assert (robot.lower[0], robot.upper[0]) == expected
+        assert (robot.model.lowerPositionLimit[0], robot.model.upperPositionLimit[0]) == expected
+
+
 def link_of(name, inside=""):
     return f'<link name="{name}">{inside}</link>'
 

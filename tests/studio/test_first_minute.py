@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from shutil import copytree
 
@@ -193,7 +194,10 @@ def test_the_page_explains_as_python_does(opened, pages, examples):
         with kineme.ActionLibrary(examples / "letters", read_only=True) as library:
             explained = library.recognize(kineme.Trajectory(np.array(times), np.array(positions))).explain()
         for caption, overlay in zip(captions, (explained.nearest, explained.runner_up), strict=True):
-            assert f": {overlay.label}, {overlay.similarity:.2f} alike" in caption
+            assert f": {overlay.label}" in caption
+            assert f", {overlay.similarity:.2f} alike" in caption
+            turned = re.search(r" turned by (-?\d+)°", caption)
+            assert float(turned[1] if turned else 0.0) == pytest.approx(overlay.turned, abs=3.0 if turned else 12.0)
             shown = int(caption.split("up to ")[1].split(" %")[0]) / 100
             assert shown == pytest.approx(overlay.differences.max(), abs=0.04)  # its paths are smoothed more
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from studio_samples import drawing
 
-from kineme import ActionLibrary, Trajectory
+from kineme import ActionLibrary, Trajectory, read_recordings
 from kineme.errors import DataError
 from kineme.io.writing.write_movement import WRITERS
 from kineme.robots import load
@@ -176,3 +176,41 @@ def test_a_start_and_a_goal_may_be_where_they_were_dragged_on_the_arm(client, sy
     goal[2] = at[2]
     wanted = np.array(_move(client, symbol, at=at.tolist(), goal=goal.tolist()).json()["scene"]["wanted"])
     np.testing.assert_allclose(wanted[[0, -1]], [at, goal], atol=1e-5)
+
+
+@pytest.fixture
+def poses(tmp_path, open_studio):
+    """A studio of movements of a tip with its orientation and a gripper in millimeters, and its symbol."""
+    s, t = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 100)), np.linspace(0, 4, 100)
+    path = np.column_stack((0.3 + 0.1 * s, 0.05 * np.sin(np.pi * s), 0.4 - 0.05 * s))
+    turned = np.column_stack((np.cos(0.2 * s), np.zeros((100, 2)), np.sin(0.2 * s)))
+    table = np.column_stack((t, turned, path, np.where(s > 0.9, 0.0, 85.0)))
+    head = "time,qw,qx,qy,qz,x [m],y [m],z [m],gripper"
+    np.savetxt(tmp_path / "pick.csv", table, delimiter=",", header=head, comments="")
+    with ActionLibrary(tmp_path / "poses", create=True) as library:
+        library.learn(read_recordings(tmp_path / "pick.csv").demonstrations, ["pick"])
+    client = open_studio(tmp_path / "poses")
+    return client, client.get("/api/library").json()["symbols"][0]["id"]
+
+
+def test_the_size_is_that_of_the_path_of_the_tip(poses, arms):
+    wanted = np.array(_move(*poses, at=[0.45, 0.0, 0.45]).json()["scene"]["wanted"])
+    assert np.ptp(wanted, axis=0).max() == pytest.approx(SIZE, rel=1e-3)
+
+
+def test_a_goal_that_was_dragged_is_met_by_what_has_an_orientation(poses, arms):
+    client, symbol = poses
+    shown = client.post("/api/rollout", json={"what": {"symbol": symbol}}).json()
+    way = np.subtract(shown["goal"], shown["start"])
+    assert len(way) == 7
+    positions = [shown["columns"].index(f"{axis} [m]") for axis in "xyz"]
+    way[positions] += [0.02, 0.01, 0.0]
+    at = [0.45, 0.0, 0.45]
+    of_all, of_positions = (
+        np.array(_move(client, symbol, at=at, size=0.1, displacement=each.tolist()).json()["scene"]["wanted"])
+        for each in (way, way[positions])
+    )
+    np.testing.assert_allclose(of_all, of_positions)
+    np.testing.assert_allclose(of_all[-1] - of_all[0], way[positions], atol=1e-4)
+    way[shown["columns"].index("qz")] += 0.1
+    assert "a displacement of x [m], y [m], z [m] alone" in _move(client, symbol, displacement=way.tolist()).text

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _NEAR = 0.5  # of the largest difference: the part around it that is named
 _SAME = 0.005  # of the size: what is rounded to 0 %
 _ALIKE = 0.05  # of the size: differences that are no more than people's hands
+_TURNED = 10.0  # [degrees]: less is no more than people's hands
 _ALONG = replace(POSITIONS, n_points=N_POINTS)
 _CONVOLUTIONS = "ranked with random convolutions; example and shares are those of the kernels"
 
@@ -55,6 +56,8 @@ class Overlay:
         mean square distance from its center.
     part : str or None
         The point, or the column, in which they differ most where they differ most; None where there is but one.
+    turned : float
+        By how many degrees the example was turned; in the plane counterclockwise if positive.
     """
 
     label: Label
@@ -62,6 +65,12 @@ class Overlay:
     path: Array = field(repr=False)
     differences: Array = field(repr=False)
     part: str | None
+    turned: float
+
+    @property
+    def name(self) -> str:
+        """The label, and by how much its example was turned where that tells them apart."""
+        return f"{self.label}{f' turned by {self.turned:.0f} degrees' * (abs(self.turned) >= _TURNED)}"
 
     @property
     def where(self) -> tuple[float, float]:
@@ -76,13 +85,13 @@ class Overlay:
         """Where and by how much they differ, in one clause."""
         largest = float(self.differences.max())
         if largest < _SAME:
-            return f"the same as an example of {self.label}"
+            return f"the same as an example of {self.name}"
         if largest <= _ALIKE:
-            return f"nowhere farther from {self.label} than {100 * largest:.0f} % of its size"
+            return f"nowhere farther from {self.name} than {100 * largest:.0f} % of its size"
         first, last = self.where
         along, part = "time" if self.path.shape[1] == 1 else "path", f", most in {self.part}" if self.part else ""
         return (
-            f"farthest from {self.label} at {100 * first:.0f} to {100 * last:.0f} % of the {along}, "
+            f"farthest from {self.name} at {100 * first:.0f} to {100 * last:.0f} % of the {along}, "
             f"by up to {100 * largest:.0f} % of its size{part}"
         )
 
@@ -141,6 +150,7 @@ class Explanation:
                 "from": first,
                 "to": last,
                 "part": shown.part,
+                "turned": shown.turned,
                 "differences": shown.differences.tolist(),
                 "path": shown.path.tolist(),
             }
@@ -171,7 +181,7 @@ class Explanation:
         overlays = {"nearest": self.nearest, "next in rank": self.runner_up}
         panels = [
             Panel(
-                f"{f'{role}: ' * (self.runner_up is not None)}{overlay.label}, {overlay.similarity:.2f} alike",
+                f"{f'{role}: ' * (self.runner_up is not None)}{overlay.name}, {overlay.similarity:.2f} alike",
                 overlay.path,
                 by_part(self.path, overlay.path, self.parts),
             )
@@ -209,17 +219,22 @@ class Transform:
 
         0 for columns that are not rotated.
         """
-        d = len(self.rotation) // self.n_points
-        R = self.rotation[:d, :d]
-        if d == 2:
-            return math.atan2(R[1, 0], R[0, 0])
-        if d != 3:
-            return 0.0
-        return math.atan2(float(np.linalg.norm(R - R.T)) / math.sqrt(2.0), float(np.trace(R)) - 1.0)
+        return angle_of(self.rotation, self.n_points)
 
     def apply(self, positions: Array) -> Array:
         """Return positions (T, d) of the demonstration, mapped."""
         return np.asarray(positions) @ self.matrix.T + self.shift
+
+
+def angle_of(rotation: Array, n_points: int) -> float:
+    """Return the angle of a rotation (d, d) [rad], as `Transform.angle` says it."""
+    d = len(rotation) // n_points
+    R = rotation[:d, :d]
+    if d == 2:
+        return math.atan2(R[1, 0], R[0, 0])
+    if d != 3:
+        return 0.0
+    return math.atan2(float(np.linalg.norm(R - R.T)) / math.sqrt(2.0), float(np.trace(R)) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,16 +291,21 @@ def explain(rationale: Rationale, answer: str, shares: dict[str, float]) -> Expl
     stored = rationale.matches.references[used]
     target, examples = (_ALONG.along(_smooth(movements, cutoff)) for movements in (movement, stored))
     examples = examples[which]
-    mapped = fit_maps(examples, target, comparison.normalization, comparison.procrustes).move(examples)
+    maps = fit_maps(examples, target, comparison.normalization, comparison.procrustes)
     channels = comparison.channels or movement.channels  # movements are in the columns that were learned
     columns = movement._samples.axis_names if channels is None else with_units(learned_names(channels), channels)
     path, parts, overlays = np.ascontiguousarray(target[0].T), _parts(comparison, channels, columns), []
-    for (label, _, similarity), moved in zip(rationale.examples, mapped, strict=True):
+    n_points = comparison.procrustes.n_points
+    for (label, _, similarity), moved, rotation in zip(
+        rationale.examples, maps.move(examples), maps.rotations, strict=True
+    ):
         example = np.ascontiguousarray(moved.T)
         squares = by_part(path, example, parts) ** 2
         differences = np.sqrt(squares.sum(axis=0))
         part = parts[squares[:, differences.argmax()].argmax()].name if parts[1:] else None
-        overlays.append(Overlay(label, similarity, example, differences, part))
+        overlays.append(
+            Overlay(label, similarity, example, differences, part, math.degrees(angle_of(rotation, n_points)))
+        )
     runner_up = overlays[1] if overlays[1:] else None
     return Explanation(answer, path, columns, parts, overlays[0], runner_up, shares, rationale.by_convolutions)
 

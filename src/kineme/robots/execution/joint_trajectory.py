@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PPoly
 
-from kineme.errors import DataError, SpecificationError, TrajectoryError
+from kineme.errors import DataError, SpecificationError
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
@@ -266,7 +266,7 @@ def fastest(robot: Robot, path: CubicSpline) -> Parameterization | None:
     Time-optimal path parameterization by reachability analysis, Pham and Pham 2018, as in the package toppra. The
     acceleration along the path is constant between two points of its grid, and the limits hold at both. The path is
     one of its length: each joint is counted in its limit of velocity, so where the movement stands nothing is passed.
-    None of a path for which toppra finds no timing, as of one that the arm cannot hold.
+    None of a path without length, and of one for which toppra finds no timing, as of one that the arm cannot hold.
     """
     try:
         import toppra
@@ -283,7 +283,9 @@ def fastest(robot: Robot, path: CubicSpline) -> Parameterization | None:
         effort = _USABLE * np.where(np.isnan(robot.effort), _UNLIMITED, robot.effort)
         frictionless, within = np.zeros(robot.n_joints), np.column_stack((-effort, effort))
         limits.append(constraint.JointTorqueConstraint(Torques(robot).of, within, frictionless, both_ends))
-    curve, generated, lengths = _by_length(robot, path)
+    if (by_length := _by_length(robot, path)) is None:
+        return None
+    curve, generated, lengths = by_length
     parts = np.arange(_PER_GAP) / _PER_GAP
     grid = np.append((curve.x[:-1, None] + np.diff(curve.x)[:, None] * parts).ravel(), curve.x[-1])
     spline = toppra.SplineInterpolator(curve.x, curve(curve.x))
@@ -325,13 +327,16 @@ def _smooth(controls: Array) -> Array:
     return np.asarray((controls[:-2] + 4 * controls[1:-1] + controls[2:]) / 6)
 
 
-def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Array]:
-    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there."""
+def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Array] | None:
+    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there.
+
+    None where the joints stand still.
+    """
     generated = np.linspace(0.0, float(path.x[-1]), _FINE)
     joints = path(generated)
     lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0) / robot.velocity, axis=1))))
     if not lengths[-1] > 0:
-        raise TrajectoryError(f"{robot.name}: expected a movement, the joints stand still")
+        return None
     least, most = _KNOTS
     knots = min(max(math.ceil(lengths[-1] / _KNOTS_APART), least), most)
     begins_knot = np.concatenate(([True], np.diff(np.floor(lengths / lengths[-1] * knots)) > 0))

@@ -200,14 +200,19 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
         limit.attrib.update({"lower": f"{-_TURNS}", "upper": f"{_TURNS}"})
     if limit is None or limit.get("lower") is None or limit.get("upper") is None:
         raise DataError(f"{path}: joint {name!r} has no limits; add <limit lower= upper= velocity= effort=/> to it")
-    values = []
-    for key in JointLimits._fields:
-        text = limit.get(key)
+
+    def number(element: ElementTree.Element, key: str) -> float:
+        text = element.get(key)
         value = math.nan if text is None else finite_number(text)
         if value is None:
             raise DataError(f"{path}: joint {name!r}: expected a number for {key}, got {text!r}")
-        values.append(value)
-    limits = JointLimits(*values)
+        return value
+
+    limits = JointLimits(*(number(limit, key) for key in JointLimits._fields))
+    if (safety := joint.find("safety_controller")) is not None:  # drivers stop the joint there; NaN is not said
+        lower, upper = (number(safety, f"soft_{key}_limit") for key in ("lower", "upper"))
+        limits = limits._replace(lower=max(limits.lower, lower), upper=min(limits.upper, upper))
+        limit.attrib.update({"lower": f"{limits.lower}", "upper": f"{limits.upper}"})
     if not limits.lower < limits.upper:
         raise DataError(f"{path}: joint {name!r}: expected lower < upper, got {limits.lower:g} and {limits.upper:g}")
     for key in ("velocity", "effort"):

@@ -9,6 +9,12 @@ import { bestRotation } from "../javascript/rotation.js";
 
 const NEAR = 0.5; // of the largest difference: the part around it that is named
 
+/** The angle of a rotation (d, d). */
+function angleOf(R, d) {
+  if (d === 2) return Math.atan2(R[2], R[0]);
+  return d === 3 ? Math.atan2(Math.hypot(R[7] - R[5], R[2] - R[6], R[3] - R[1]), R[0] + R[4] + R[8] - 1) : 0;
+}
+
 /** Null where positions are not compared. */
 export function explain(recognizer, { times, positions }, answer) {
   const { header, arrays, stored } = recognizer;
@@ -44,6 +50,7 @@ export function explain(recognizer, { times, positions }, answer) {
       largest_difference: differences[most],
       from: edge(-1),
       to: edge(1),
+      turned: (180 / Math.PI) * angleOf(R, d),
       differences,
       path: laid,
     };

@@ -86,6 +86,7 @@ class OverlayOut(BaseModel):
     start: float = Field(validation_alias="from", serialization_alias="from")
     to: float
     part: str | None
+    turned: float
     differences: list[float]
     path: list[list[float]]
 

@@ -13,6 +13,7 @@ from fastapi import Path as InPath
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
+from kineme.dmp.generation.generate import Learned
 from kineme.errors import KinemeError, SpecificationError
 from kineme.io.writing.write_movement import WRITERS
 from kineme.robots.execution.preflight import Preflight, checks_as_data, preflight_table
@@ -22,7 +23,7 @@ from kineme.robots.models.robot import MODELS, Robot, load
 from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move as move_arm
 from kineme.robots.planning.robot_movement import InfeasibleError, RobotMovement
-from kineme.robots.planning.roles import space_of
+from kineme.robots.planning.roles import roles_of, space_of
 from kineme.robots.view.write_view import posture_data, scene_data, shapes_of
 from kineme.studio.server.records import Number, Point, RequestBody, Text, numbers
 from kineme.studio.server.refusals import in_studio_words
@@ -31,6 +32,7 @@ from kineme.studio.server.studio import Reads, Studio
 
 _ROS = {".yaml": write_action_goal, ".mcap": write_bag, ".bag": write_bag}  # beside the writers of tables
 ArmName = Annotated[str, InPath(max_length=200, description="Name of an arm, as in `/api/robots`.")]
+_AS_SHOWN = 0.01  # of a component of a quaternion
 _STEPS = 6  # towards the hand, from where the arm stands
 _REACH = 0.4  # of the distance of the tip at rest: half of the square that the hand moves in
 
@@ -46,7 +48,8 @@ class ArmsOut(BaseModel):
 class MoveRequest(PrimitiveRequest):
     """A movement for an arm; `size` is its largest extent there [m], `at` and `goal` are in the frame of the robot.
 
-    Instead of a goal, `displacement` is the way from start to goal in the unit of the library.
+    Instead of a goal, `displacement` is the way from start to goal in the unit of the library: of the positions, or of
+    all columns that move, as `/api/rollout` says start and goal.
     """
 
     robot: Text
@@ -198,15 +201,18 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
     space = space_of(learned.primitive.channels, learned.example, robot)
     if body.goal is not None and body.at is None and space != "joints":
         raise SpecificationError("expected `at` with a goal: where the movement starts in the frame of the robot")
-    extent = float(np.ptp(learned.example, axis=0).max()) or 1.0  # the largest, in the unit of the library
+    example = learned.example
+    n, arm = example.shape[1], robot if space == "joints" else None
+    positions = roles_of(learned.primitive.channels, n, "joints" if arm else "tip", arm).positions
+    extent = float(np.ptp(example[:, positions], axis=0).max(initial=0.0)) or 1.0  # in the unit of the library
     generated = generate_at(
         learned,
         body.at,
         body.goal,
         body.duration,
-        displacement=None if body.goal is not None else body.displacement,
+        displacement=None if body.goal is not None else _way(body.displacement, learned, positions),
         scale=None if body.size is None or space == "joints" else body.size / extent,
-        joints=robot if space == "joints" else None,
+        joints=arm,
         plane=body.plane,
     )
     return move_arm(
@@ -219,6 +225,22 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
         steps=generated.steps,
         continuous=generated.continuous,
     )
+
+
+def _way(displacement: list[float] | None, learned: Learned, positions: list[int]) -> list[float] | None:
+    """Return the way of the positions; what moves beside them must move as it was shown."""
+    names = learned.moving_columns
+    if displacement is None or len(displacement) != len(names) or len(positions) == len(names):
+        return displacement
+    recorded, moved = learned.example[[0, -1]], [learned.columns[k] for k in positions]
+    shown = dict(zip(learned.columns, recorded[1] - recorded[0], strict=True))
+    way = dict(zip(names, displacement, strict=True))
+    if other := [name for name in names if name not in moved and abs(way[name] - shown[name]) > _AS_SHOWN]:
+        raise SpecificationError(
+            f"expected a displacement of {', '.join(moved)} alone, got one of {', '.join(other)} as well: an arm turns "
+            "as it was shown; leave these at the demonstrated goal"
+        )
+    return [way[name] for name in moved]
 
 
 def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import { Overlay } from "./overlay.js";
 const ROWS = 5;
 const BEGUN = 0.1; // share of the path from which a name is said: every beginning is unlike the whole
 const ALIKE = 0.05; // of the size: differences that are no more than people's hands
+const TURNED = 10; // [degrees]: less is no more, either
 const percent = (share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
 const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const pValue = (p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
@@ -83,7 +84,8 @@ export class AnswerPanel {
       caption.parentElement.hidden = !shown;
       if (!shown) continue;
       overlay.show({ ...shown, drawn });
-      const alike = `${shown.label}, ${shown.similarity.toFixed(2)} alike`;
+      const turn = Math.abs(shown.turned) < TURNED ? "" : ` turned by ${Math.round(shown.turned)}°`;
+      const alike = `${shown.label}${turn}, ${shown.similarity.toFixed(2)} alike`;
       write(caption, `${k ? "Next" : "Nearest"}: ${alike}; ${differs(shown)}`);
     }
   }

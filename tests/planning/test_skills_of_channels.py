@@ -1,4 +1,4 @@
-"""A joint that begins near half a turn, as an encoder reports it that jumps from 180 to -180 degrees."""
+"""Skills of joints that begin near half a turn, where an encoder jumps, and of columns in another order."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.planning import SkillTools, outside, skill_of
 from kineme.planning.preview import nearest_inside, plan_symbol
-from kineme.planning.skill import nearest_demonstration
+from kineme.planning.skill import move_to, nearest_demonstration
 from kineme.robots import load
 
 U = np.linspace(0.0, 1.0, 100)
@@ -110,3 +110,20 @@ def test_a_monitor_sees_a_push_in_whichever_turn(library, ends, turns, reported)
     monitor.update(3.0 * U, path + 0.6 * away * np.exp(-(((U - 0.5) / 0.1) ** 2))[:, None])
     assert not monitor.finish().inside
     assert monitor.finish().state.largest > 2 * max(largest, monitor.shown.threshold)
+
+
+def test_places_are_those_of_their_columns_where_a_quaternion_comes_first(tmp_path):
+    channels = (
+        Channel("tip", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
+        *(Channel(axis, "position", (axis,), "m") for axis in "xyz"),
+    )
+    quaternions = np.column_stack((np.cos(0.2 * EASED), np.zeros((100, 2)), np.sin(0.2 * EASED)))
+    paths = [np.column_stack((quaternions, (k + EASED)[:, None] * [0.1, 0.2, 0.3])) for k in (1, 2)]
+    plain = Demonstrations.from_arrays(paths, ["lift"] * 2, [3.0 * U] * 2)
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(Demonstrations.of_movements(of_channels(plain.movements, channels)))
+        skill = skill_of(library, "lift")
+        start, goal = np.array([0.15, 0.3, 0.45]), np.array([0.27, 0.48, 0.77])
+        recorded = move_to(library, skill, start, goal).demonstrations[0].recorded
+    np.testing.assert_allclose(recorded[[0, -1], 4:], [start, goal], atol=1e-9)
+    np.testing.assert_allclose(np.abs(recorded[[0, -1], :4]), np.abs(quaternions[[0, -1]]), atol=1e-6)
