@@ -106,7 +106,7 @@ def _beside(example: Example, movement: Demonstrations, demonstrations: Demonstr
 class Panel(NamedTuple):
     """An example that is laid over a movement: its path (T, d), and distances (P, T) from the movement in each part."""
 
-    title: str
+    title: Sequence[str]  # lines
     path: Array
     differences: Array
 
@@ -143,7 +143,7 @@ def draw_explanation(
                 shown = view.points(path), view.points(overlay.path)
                 colored = _draw_overlay(panel, *shown, overlay.differences[r], max(float(largest.max()), 1e-9))
                 panel.set(xlabel=drawable(view.names[0]), ylabel=drawable(view.names[1]))
-                lines = [overlay.title] * (r == rows[0]) + [parts[r].name] * (len(view.columns) > 1 < len(parts))
+                lines = [*overlay.title] * bool(r == rows[0]) + [parts[r].name] * (len(view.columns) > 1 < len(parts))
                 panel.set_title("\n".join(drawable(shortened(line, 40)) for line in lines))
         _set_equal_limits(panels, views, [path, *(overlay.path for overlay in overlays)])
         panels[0, 0].plot([], [], color=GRAY, linewidth=4, alpha=0.45, label="example, laid over it")

@@ -70,7 +70,12 @@ class Overlay:
     @property
     def name(self) -> str:
         """The label, and by how much its example was turned where that tells them apart."""
-        return f"{self.label}{f' turned by {self.turned:.0f} degrees' * (abs(self.turned) >= _TURNED)}"
+        return f"{self.label} {self.turn}".rstrip()
+
+    @property
+    def turn(self) -> str:
+        """By how much the example was turned; empty for less than 10 degrees."""
+        return f"turned by {self.turned:.0f} degrees" if abs(self.turned) >= _TURNED else ""
 
     @property
     def where(self) -> tuple[float, float]:
@@ -181,7 +186,10 @@ class Explanation:
         overlays = {"nearest": self.nearest, "next in rank": self.runner_up}
         panels = [
             Panel(
-                f"{f'{role}: ' * (self.runner_up is not None)}{overlay.name}, {overlay.similarity:.2f} alike",
+                [
+                    f"{f'{role}: ' * (self.runner_up is not None)}{overlay.label}, {overlay.similarity:.2f} alike",
+                    *filter(None, [overlay.turn]),
+                ],
                 overlay.path,
                 by_part(self.path, overlay.path, self.parts),
             )
