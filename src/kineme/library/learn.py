@@ -69,14 +69,15 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     places: Sequence[Any] | None = None,
     progress: Progress | None = None,
     groups: Sequence[Any] | None = None,
+    continues: int | None = None,
 ) -> LearnReport:
-    """Store new movements; see `ActionLibrary.learn`."""
+    """Store new movements; see `ActionLibrary.learn`. `continues` is the version that the same call made before."""
     store.check_writable()
     before = store.version
     demos, described = _described(store, movements, labels, source, places, groups)
     reports: list[commit.Committed] = []
     done = 0
-    for report in commit_batches(store, described):
+    for report in commit_batches(store, described, continues):
         reports.append(report)
         done += len(report.ids)
         if progress is not None:
@@ -124,14 +125,16 @@ def batches(lengths: NDArray[np.intp], most: int = _BATCH_MOVEMENTS) -> Iterator
         start = stop
 
 
-def commit_batches(store: Store, several: Iterable[commit.Batch]) -> Iterator[commit.Committed]:
+def commit_batches(
+    store: Store, several: Iterable[commit.Batch], continues: int | None = None
+) -> Iterator[commit.Committed]:
     """Commit batches one after the other: one is written while what is new in the next one is serialized.
 
     An undo takes back all of them. Of a batch that has all of its rows already, none is made.
     """
     with ThreadPoolExecutor(1, "kineme-library") as pool:
         pending: Future[commit.Committed] | None = None
-        version = None
+        version = continues
         for batch in several:
             with store.reading() as connection:
                 stored = commit.find_stored(connection, batch)

@@ -62,10 +62,11 @@ def delete_symbol(store: Store, who: str) -> int:
 
 
 @repeated
-def delete_movements(store: Store, ids: Any) -> int:
-    """Delete movements; a symbol whose prototype is among them loses it."""
+def delete_movements(store: Store, ids: Any, continues: int | None = None) -> int:
+    """Delete movements; a symbol whose prototype is among them loses it. `continues` as in `assign`."""
     wanted = as_ids(store, ids)
     with store.writing("delete", {"movements": len(wanted), "first": int(wanted[0])}) as change:
+        continue_from(change, continues)
         keys = {"keys": listed(wanted)}
         _leave(change, among("movement"), keys)
         for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys):
@@ -146,7 +147,7 @@ def assign(  # noqa: PLR0913, PLR0917 - what a symbol gets
     with store.writing("assign") as change:
         state = _find(change.connection, who)
         change.detail.update(symbol=who if state is None else state[_NAME], movements=len(wanted), how=how, **values)
-        _continue(change, continues)
+        continue_from(change, continues)
         key = make(change, check_name(who)) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])
@@ -167,7 +168,8 @@ def release(store: Store, ids: Any) -> int:
     return change.version
 
 
-def _continue(change: Change, before: int | None) -> None:
+def continue_from(change: Change, before: int | None) -> None:
+    """Note the version that the same call made before, if any, so that an undo takes back both."""
     if before is not None:
         change.detail[CONTINUES] = before
 
