@@ -150,8 +150,8 @@ def test_what_a_person_changed_is_learned_and_nothing_else(annotated, tmp_path):
     arguments = ("correct", source, "--labels", table, "-l", library)
     would = answer(*arguments, "--dry-run")
     assert kineme.ActionLibrary(library, read_only=True).version == 1
-    assert (would["learned"], would["symbols"]) == (0, ["wave"])
     said = answer(*arguments)
+    assert {**would, "version": 2, "dry_run": False} == said
     assert sorted(change["kind"] for change in said["changes"]) == ["moved", "named", "removed", "renamed"]
     assert said["learned"] == 3
     assert said["unchanged"] == len(rows) - 3
@@ -163,6 +163,34 @@ def test_what_a_person_changed_is_learned_and_nothing_else(annotated, tmp_path):
     assert (again["learned"], again["duplicates"]) == (0, 3)
     run("library", "undo", "--library", library)
     assert len(kineme.ActionLibrary(library, read_only=True)) == 9
+
+
+def test_one_undo_takes_back_what_was_learned_and_what_moved(annotated, tmp_path):
+    source, library, rows = annotated
+    rows = [row for row in rows if row["place"] == "episode 1"]
+    arguments = ("correct", source, "--before", tmp_path / "set.csv", "-l", library, "--labels")
+    slip = [dict(row) for row in rows]
+    slip[0]["symbol"], slip[1]["symbol"] = "swing", "swing"
+    run(*arguments, _write(tmp_path / "slip.csv", slip))
+    mended = [dict(row) for row in rows]
+    mended[0]["symbol"], mended[1]["symbol"], mended[2]["symbol"] = "sway", "cup", "cup"
+    arguments = (*arguments, _write(tmp_path / "mended.csv", mended))
+    would = run(*arguments, "--dry-run").stdout.splitlines()
+    said = run(*arguments).stdout.splitlines()
+    assert said[0].startswith("learned 1 movement, 2 moved to another symbol, 2 new symbols; ")
+    assert [said[0].replace("learned", "would learn", 1), *said[1:-1]] == would
+    assert said[-1].startswith("take it back: kineme library undo")
+    run("library", "undo", "-l", library)
+    with kineme.ActionLibrary(library, read_only=True) as actions:
+        assert {symbol.name: len(symbol) for symbol in actions.symbols() if symbol.name not in SYMBOLS} == {"swing": 2}
+    mended[2]["symbol"] = rows[2]["symbol"]
+    _write(tmp_path / "mended.csv", mended)
+    said = run(*arguments).stdout
+    assert said.startswith("learned 0 movements, 2 moved to another symbol, 2 new symbols; ")
+    assert "take it back" in said
+    said = run(*arguments).stdout
+    assert said.startswith("learned 0 movements, 2 stored already; ")
+    assert "take it back" not in said
 
 
 def test_a_named_data_set_says_itself_what_was_annotated(annotated, tmp_path):

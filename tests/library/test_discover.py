@@ -194,6 +194,33 @@ def test_storing_again_replaces_what_was_proposed_and_undo_takes_it_back(worked,
         assert stored_proposals(library.store) == []
 
 
+def test_discovering_again_leaves_no_pieces_of_the_run_before(worked, tmp_path):
+    episodes, _, discovery = worked
+    again = replace(discovery, segments=tuple(each._replace(end=each.end - 0.1) for each in discovery.segments))
+    with ActionLibrary(tmp_path / "other", create=True, recognizer=KEPT) as other:
+        store_discovery(other.store, episodes, discovery)
+        shown = other.movements()
+    with ActionLibrary(tmp_path / "actions", create=True, recognizer=KEPT) as library:
+        held = library.learn(shown[[0]], [None]).ids  # a movement that discoveries did not bring
+        store_discovery(library.store, episodes, discovery)
+        library.accept(library.propose()[-1], "kept")
+        kept, version = {*library["kept"].members}, library.version
+
+        def check():
+            store_discovery(library.store, episodes, again)
+            proposed = {key for each in stored_proposals(library.store) for key in each.members}
+            assert {*library.ids()} == {*proposed, *kept, *held}
+            assert len(proposed) == len(discovery.segments)
+            assert not proposed & {*kept, *held}
+
+        check()
+        library.undo()
+        assert library.history()[-1].detail["to"] == version
+        assert [each.name for each in library.propose()] == [kind.name for kind in discovery.kinds[:-1]]
+        check()  # what came back by the undo has other ids
+        assert library.verify() == []
+
+
 def test_a_library_of_other_columns_is_refused(worked, tmp_path):
     episodes, _, discovery = worked
     with ActionLibrary(tmp_path / "actions", create=True) as library:

@@ -398,3 +398,17 @@ def test_columns_are_taken_by_name_from_recordings_with_more_and_a_missing_one_i
         else:
             with pytest.raises(TrajectoryError, match=f"with the columns {lost} too, which were learned, got .*--col"):
                 actions.recognize(recording)
+
+
+def test_a_grounding_has_the_units_of_the_recordings_and_no_others(library, tmp_path):
+    assert library.ground("a")["units"]["position"] == ["m"] * 6  # turns are lengths beside positions
+    assert library.ground("a", units="meters")["units"]["position"] == ["meters"] * 6
+    with pytest.raises(TrajectoryError, match=r"expected m as the unit of tool\.x, as it was recorded, got mm"):
+        library.ground("a", units="mm")
+    with pytest.raises(TrajectoryError, match=r"expected m as the unit of tool\.q\.rz"):
+        library.ground("a", units=["m", "m", "m", "m", "m", "rad"])
+    some = tuple(channel._replace(unit=None) if channel.name == "tool.y" else channel for channel in CHANNELS)
+    with ActionLibrary(tmp_path / "some", create=True) as other:
+        other.learn(poses(channels=some))
+        assert other.ground("a")["units"]["position"] is None
+        assert other.ground("a", units="m")["units"]["position"] == ["m"] * 6

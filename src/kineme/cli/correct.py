@@ -53,10 +53,8 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             read_labels(annotated) if annotated is not None else _annotated(recordings, parsed, library, error_rate)
         )
         corrections = corrections_of(parsed, table_of, before)
-        symbols = {symbol.name for symbol in library.symbols()}
-        report = None
-        if not dry_run:
-            report = learn_corrections(library.store, parsed, corrections, options, root_of(*recordings))
+        symbols, version = {symbol.name for symbol in library.symbols()}, library.version
+        report = learn_corrections(library.store, parsed, corrections, options, root_of(*recordings), dry_run)
         learned = [change for change in corrections.changes if change.learned]
         data = {
             "changes": [
@@ -69,15 +67,17 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
                 for change in corrections.changes
             ],
             "unchanged": corrections.unchanged,
-            "learned": 0 if report is None else report.added,
-            "duplicates": 0 if report is None else report.duplicates,
+            "learned": report.added,
+            "moved": report.moved,
+            "duplicates": report.duplicates,
             "symbols": sorted({str(change.stretch.row.label) for change in learned} - symbols),
             "version": library.version,
             "dry_run": dry_run,
             "problems": [str(problem) for problem in (*parsed.problems, *corrections.problems)],
         }  # fmt: skip
     problems = problem_lines((*parsed.problems, *corrections.problems), "not read: ")
-    say(as_json, data, lambda: _text(data, folder, problems))
+    undo = "" if data["version"] == version else f"take it back: kineme library undo --library {printable(folder)}"
+    say(as_json, data, lambda: _text(data, undo, problems))
 
 
 def _beside(recordings: tuple[Path, ...]) -> Path:
@@ -121,18 +121,16 @@ def _annotated(paths: tuple[Path, ...], parsed: Any, library: Any, error_rate: f
     return as_labels(report.annotations)
 
 
-def _text(data: dict[str, Any], folder: Any, problems: list[str]) -> str:
+def _text(data: dict[str, Any], undo: str, problems: list[str]) -> str:
     from kineme.library.correct import CHANGES
 
     changes = data["changes"]
     counts = Counter(change["kind"] for change in changes)
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
-    stored = f", {data['duplicates']:,} stored already" if data["duplicates"] else ""
-    learned = sum(change["learned"] for change in changes)
-    verb = f"would learn {counted(learned, 'movement')}" if data["dry_run"] else (
-        f"learned {counted(data['learned'], 'movement')}{stored}"
-    )  # fmt: skip
-    lines = [f"{verb}{new}; {data['unchanged']:,} as annotated, not learned"]
+    moved = f", {data['moved']:,} moved to another symbol" if data["moved"] else ""
+    stored = f", {n:,} stored already" if (n := data["duplicates"] - data["moved"]) else ""
+    learned = f"{'would learn' if data['dry_run'] else 'learned'} {counted(data['learned'], 'movement')}"
+    lines = [f"{learned}{moved}{stored}{new}; {data['unchanged']:,} as annotated, not learned"]
     lines += [f"{n:,} {kind}: {CHANGES[kind]}" for kind, n in counts.items()]
     if changes:
         cells = [
@@ -144,6 +142,4 @@ def _text(data: dict[str, Any], folder: Any, problems: list[str]) -> str:
         ]  # fmt: skip
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
     lines += [*problems[:_SHOWN], *unlisted({"changes": changes, "problems": problems}, _SHOWN)]
-    if data["learned"]:
-        lines.append(f"take it back: kineme library undo --library {printable(folder)}")
-    return "\n".join(lines)
+    return "\n".join([*lines, undo] if undo else lines)

@@ -239,7 +239,8 @@ def _point(point: list[float], member: dict[str, Any]) -> str:
 @library_option
 @click.option("--by", type=click.Choice(["medoid", "mean"]), default="medoid", show_default=True,
               help="Prototype: the most typical movement, or the mean.")  # fmt: skip
-@click.option("--units", help="Units of the positions, as mm; one, or one per dimension separated by commas.")
+@click.option("--units", help="Units of the positions, as mm; one, or one per dimension separated by commas.  "
+              "[default: those of the recordings]")  # fmt: skip
 @click.option("--output", "-o", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), default="-",
               show_default=True, help="A .json file; - for the screen.")  # fmt: skip
 def ground(symbol: str, folder: Any, by: str, units: str | None, output: Path) -> None:

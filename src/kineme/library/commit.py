@@ -69,6 +69,12 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
     return _commit(store, batch, continues, None)
 
 
+def stored_ids(store: Store, batch: Batch) -> list[int]:
+    """Return the id of each movement of a batch; of what is new, copies alike, one below 0."""
+    with store.reading() as connection:
+        return _keys(-len(batch.digests), batch, find_stored(connection, batch))[0]
+
+
 def _n_rows(store: Store, batch: Batch) -> dict[str, int]:
     """Return how many rows a batch adds to each table whose rows are numbered, if nothing changes meanwhile."""
     with store.reading() as connection:

@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from kineme.errors import DataError
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.pieces import is_episodic
 from kineme.io.reading.read_labels import LabelRow, LabelTable, Stretch, cut_stretches, stretches_of
 from kineme.io.records import Problem
 from kineme.io.writing.annotations import Annotation
-from kineme.library.learn import LearnReport, learn_recordings
+from kineme.library.learn import learn_recordings, stored_ids
 from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
 from kineme.library.storage.store import Store
@@ -139,24 +141,41 @@ def _kind(near: Stretch | None, new: Stretch) -> str | None:
     return "named" if was is None else "moved" if was == now else "renamed"
 
 
+class Learned(NamedTuple):
+    """What became of the examples of corrections."""
+
+    added: int  # new movements
+    moved: int  # those that the library held under another symbol
+    duplicates: int  # examples that it held, also those that moved
+
+
 def learn_corrections(
     store: Store,
     recordings: Recordings,
     corrections: Corrections,
     options: Mapping[str, Any] | None = None,
     root: str | PurePath = "",
-) -> LearnReport | None:
-    """Learn the examples of corrections; None if there are none.
+    dry_run: bool = False,
+) -> Learned:
+    """Learn the examples of corrections, or only tell what that would do.
 
-    All new ones are one version of the library, which an undo takes back. Examples that it holds under another symbol,
-    since they were corrected before, join the symbol that they have now: each symbol that gains some is one more.
+    Examples that the library holds under another symbol, since they were corrected before, join the symbol that they
+    have now. One undo takes back all of it.
     """
     examples = corrections.examples
     if not examples:
-        return None
-    report = learn_recordings(store, cut_stretches(recordings, examples), options, root=root)
-    labels, names = [str(stretch.row.label) for stretch in examples], names_of(store, report.ids)
-    for symbol in dict.fromkeys(label for label, name in zip(labels, names, strict=True) if label != name):
-        others = [label == symbol != name for label, name in zip(labels, names, strict=True)]
-        storage.assign(store, report.ids[others], symbol, "label")
-    return report
+        return Learned(0, 0, 0)
+    pieces, before = cut_stretches(recordings, examples), store.version
+    if dry_run:
+        ids = stored_ids(store, pieces, options, root)
+        added, version = len(np.unique(ids[ids < 0])), before
+    else:
+        report = learn_recordings(store, pieces, options, root=root)
+        ids, added, version = report.ids, report.added, report.version
+    moving: dict[str, set[int]] = {}
+    for key, stretch, name in zip(ids.tolist(), examples, names_of(store, ids), strict=True):
+        if name is not None and name != stretch.row.label:
+            moving.setdefault(str(stretch.row.label), set()).add(key)
+    for symbol, keys in ({} if dry_run else moving).items():
+        version = storage.assign(store, sorted(keys), symbol, "label", continues=version if version > before else None)
+    return Learned(added, sum(map(len, moving.values())), len(examples) - added)

@@ -22,7 +22,8 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.reading.episode_recordings import heads_of
 from kineme.io.writing.annotations import Annotation
 from kineme.library.learn import learn
-from kineme.library.proposals import NamedProposal, store_proposals
+from kineme.library.proposals import NamedProposal, discovered_ids, store_proposals
+from kineme.library.storage import changes, read
 from kineme.library.storage.store import Store
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import find_channels
@@ -350,7 +351,14 @@ def store_discovery(
     feature: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:
-    """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version."""
+    """Store the movements of a discovery, read from the episodes again, and propose its kinds; return the version.
+
+    Movements without a symbol that earlier discoveries brought, and this one does not have, are deleted. One undo takes
+    back all of it.
+    """
+    earlier = discovered_ids(store)
+    held, version = np.setdiff1d(read.all_ids(store), earlier), store.version
+    made: int | None = None  # last version that this call made
     by_episode: dict[int, list[Segment]] = {}
     for segment in discovery.segments:
         if segment.kind is not None:
@@ -362,14 +370,16 @@ def store_discovery(
     channels: Channels | None = None  # of the first movements: a gripper that rests in others is none of steps
 
     def flush() -> None:
-        nonlocal channels
+        nonlocal channels, made
         if not pending:
             return
         segments, times, states = zip(*pending, strict=True)
         names = [f"{segment.place}[{segment.start:.2f}-{segment.end:.2f} s]" for segment in segments]
         demos = Demonstrations.from_arrays(states, None, times, names)
         channels = channels or find_channels(columns, demos.positions, demos.offsets, {})
-        ids.extend(learn(store, of_columns(demos, channels)).ids.tolist())
+        report = learn(store, of_columns(demos, channels), continues=made)
+        made = report.version if report.version > version else made
+        ids.extend(report.ids.tolist())
         stored.extend(segments)
         pending.clear()
 
@@ -388,6 +398,9 @@ def store_discovery(
             progress(n)
     flush()
     keys = np.array(ids, dtype=np.int64)
+    stale = np.intersect1d(np.setdiff1d(earlier, keys), read.unlabeled_ids(store))
+    if len(stale):
+        made = changes.delete_movements(store, stale, continues=made)
     proposals = []
     for k, kind in enumerate(discovery.kinds):
         members = [i for i, segment in enumerate(stored) if segment.kind == k]
@@ -395,7 +408,7 @@ def store_discovery(
             medoid = max(members, key=lambda i: stored[i].density)
             certainty = float(np.mean([stored[i].confidence for i in members]))
             proposals.append(NamedProposal(kind.name, np.unique(keys[members]), int(keys[medoid]), certainty))
-    return store_proposals(store, proposals)
+    return store_proposals(store, proposals, np.intersect1d(held, keys).tolist(), made)
 
 
 def _heads(episode: Episode, feature: str) -> tuple[str, ...]:

@@ -13,14 +13,16 @@ from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.generation.generate import Learned, has_orientation, learn_one
 from kineme.dmp.recorded_as import recorded_as
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library.members import described
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
+from kineme.movements.channels.channel import Channels, learned_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.sampling import evenly_spaced
+from kineme.units import is_unit_of, unit_named
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
 
@@ -61,6 +63,7 @@ def ground_symbol(
     typical = prototype_of(store, grounded)
     members = np.union1d(_some_members(grounded), [typical])
     name = SymbolName(grounded.id, grounded.name, grounded.description, grounded.parents)
+    units = _units(store, units)
     medoid, like = int(np.searchsorted(members, typical)), store.specification.comparison
     grounding = ground(name, _primitives(store, members), by=by, units=units, medoid=medoid, like=like)
     grounding["prototype"]["medoid"] = typical  # its id, for queries to the library
@@ -77,6 +80,31 @@ def space_of(store: Store) -> ConceptualSpace:
         )
     prototypes = described(store, [prototype_of(store, each) for each in shown])
     return conceptual_space([each.name for each in shown], prototypes, store.specification.comparison)
+
+
+def _units(store: Store, said: str | Sequence[str] | None) -> str | Sequence[str] | None:
+    """Return the units that were said, else those of the recordings; refuse others than these have."""
+    channels = store.channels or ()
+    known = _units_recorded(channels)
+    if said is None:
+        return None if not known or None in known else [str(unit) for unit in known]
+    each = [said] * len(known) if isinstance(said, str) else list(said)
+    for name, unit, other in zip(learned_names(channels), known, each, strict=False):  # `ground` counts them
+        if unit is not None and (unit_named(unit) or unit.lower()) != (unit_named(str(other)) or str(other).lower()):
+            raise TrajectoryError(
+                f"expected {unit} as the unit of {name}, as it was recorded, got {other}; leave the units out, or say "
+                "those that the library knows: a unit converts no numbers"
+            )
+    return said
+
+
+def _units_recorded(channels: Channels) -> list[str | None]:
+    """Return the unit of each learned coordinate; turns are lengths beside positions, see `lever_of`, else [rad]."""
+    lengths = [channel.unit for channel in channels if channel.kind == "position"]
+    turns = "rad" if not lengths else lengths[0] if is_unit_of(lengths[0], "length") else None
+    return [
+        turns if channel.kind == "orientation" else channel.unit for channel in channels for _ in channel.coordinates
+    ]
 
 
 def _some_members(of_symbol: Symbol) -> Ids:

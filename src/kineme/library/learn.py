@@ -69,26 +69,15 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     places: Sequence[Any] | None = None,
     progress: Progress | None = None,
     groups: Sequence[Any] | None = None,
+    continues: int | None = None,
 ) -> LearnReport:
-    """Store new movements; see `ActionLibrary.learn`."""
+    """Store new movements; see `ActionLibrary.learn`. `continues` is the version that the same call made before."""
     store.check_writable()
     before = store.version
-    demos = in_columns_of(store, Demonstrations.of(movements))
-    check_channels(store, demos)
-    commit.check(demos)
-    names = as_names(demos, "label", demos.labels if labels is None else labels)
-    people = as_names(demos, "group", groups)
-    sources, where = _as_origins(source, places, len(demos))
-    described = (
-        commit.Batch(
-            part, digests(part, commit.evenly_sampled(part)), names[rows], people[rows], sources[rows], where[rows]
-        )
-        for rows in batches(demos.lengths, min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-len(demos) // 4))))
-        for part in [Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))]
-    )
+    demos, described = _described(store, movements, labels, source, places, groups)
     reports: list[commit.Committed] = []
     done = 0
-    for report in commit_batches(store, described):
+    for report in commit_batches(store, described, continues):
         reports.append(report)
         done += len(report.ids)
         if progress is not None:
@@ -102,6 +91,30 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     )
 
 
+def _described(
+    store: Store,
+    movements: MovementsLike,
+    labels: Sequence[Any] | None,
+    source: Source | Sequence[Source | None] | None,
+    places: Sequence[Any] | None,
+    groups: Sequence[Any] | None,
+) -> tuple[Demonstrations, Iterator[commit.Batch]]:
+    """Return movements in the columns of the library, and batches of them; refuse what cannot be stored."""
+    demos = in_columns_of(store, Demonstrations.of(movements))
+    check_channels(store, demos)
+    commit.check(demos)
+    names = as_names(demos, "label", demos.labels if labels is None else labels)
+    people = as_names(demos, "group", groups)
+    sources, where = _as_origins(source, places, len(demos))
+    return demos, (
+        commit.Batch(
+            part, digests(part, commit.evenly_sampled(part)), names[rows], people[rows], sources[rows], where[rows]
+        )
+        for rows in batches(demos.lengths, min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-len(demos) // 4))))
+        for part in [Demonstrations.of_movements(demos.movements.between(rows.start, rows.stop))]
+    )
+
+
 def batches(lengths: NDArray[np.intp], most: int = _BATCH_MOVEMENTS) -> Iterator[slice]:
     """Yield ranges of movements of these lengths, limited by movements and samples; each has at least one movement."""
     start, n, ends = 0, len(lengths), np.cumsum(lengths)
@@ -112,14 +125,16 @@ def batches(lengths: NDArray[np.intp], most: int = _BATCH_MOVEMENTS) -> Iterator
         start = stop
 
 
-def commit_batches(store: Store, several: Iterable[commit.Batch]) -> Iterator[commit.Committed]:
+def commit_batches(
+    store: Store, several: Iterable[commit.Batch], continues: int | None = None
+) -> Iterator[commit.Committed]:
     """Commit batches one after the other: one is written while what is new in the next one is serialized.
 
     An undo takes back all of them. Of a batch that has all of its rows already, none is made.
     """
     with ThreadPoolExecutor(1, "kineme-library") as pool:
         pending: Future[commit.Committed] | None = None
-        version = None
+        version = continues
         for batch in several:
             with store.reading() as connection:
                 stored = commit.find_stored(connection, batch)
@@ -307,14 +322,22 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 
     `root` is the folder that was read, stored before the names of files. Labels are by default those of the movements.
     """
+    sources, places = _origins_of(recordings, options, root)
+    labels = list(recordings.labels) if labels is None else labels
+    return learn(store, recordings.demonstrations, labels, sources, places, progress, groups)
+
+
+def stored_ids(
+    store: Store, recordings: Recordings, options: Mapping[str, Any] | None = None, root: str | PurePath = ""
+) -> NDArray[np.int64]:
+    """Return the ids (n,) of recordings in the library, below 0 of those that `learn_recordings` would add."""
+    _, described = _described(store, recordings.demonstrations, None, *_origins_of(recordings, options, root), None)
+    return np.concatenate([np.array(commit.stored_ids(store, batch), dtype=np.int64) for batch in described])
+
+
+def _origins_of(
+    recordings: Recordings, options: Mapping[str, Any] | None, root: str | PurePath
+) -> tuple[list[Source], list[str]]:
     of_file = source_at(options or {}, root)
     files = {file.path: of_file(file.path, file.sha256, file.size) for file in recordings.sources}
-    return learn(
-        store,
-        recordings.demonstrations,
-        list(recordings.labels) if labels is None else labels,
-        [files[file.path] for file in recordings.sources],
-        places=[file.place for file in recordings.sources],
-        progress=progress,
-        groups=groups,
-    )
+    return [files[file.path] for file in recordings.sources], [file.place for file in recordings.sources]

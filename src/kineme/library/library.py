@@ -542,7 +542,8 @@ class ActionLibrary:
         by : {"medoid", "mean"}, default "medoid"
             The prototype: the one that was set or else the medoid, or the mean of the members aligned with that one.
         units : str or sequence of d str, optional
-            Units of the positions, as "mm", or one of each dimension.
+            Units of the positions, as "mm", or one of each dimension, by default those of the recordings, if all are
+            known. Refused if a recording says another one: a unit converts no numbers.
         """
         from kineme.library.grounding import ground_symbol
 

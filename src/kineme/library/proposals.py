@@ -132,18 +132,35 @@ class NamedProposal:
     certainty: float  # mean probability of the members
 
 
-def store_proposals(store: Store, proposals: Sequence[NamedProposal]) -> int:
-    """Store proposals, which `propose` gives before all others, instead of those stored before; return the version."""
+def store_proposals(
+    store: Store, proposals: Sequence[NamedProposal], held: Sequence[int] = (), continues: int | None = None
+) -> int:
+    """Store proposals, which `propose` gives before all others, instead of those stored before; return the version.
+
+    `held` are those of their movements that the library held already, not from a discovery; `continues` is the version
+    that the same call made before.
+    """
     detail = {
         "names": [proposal.name for proposal in proposals],
         "sizes": [len(proposal.members) for proposal in proposals],
         "medoids": [int(proposal.medoid) for proposal in proposals],
         "certainties": [round(float(proposal.certainty), 4) for proposal in proposals],
         "movements": [int(key) for proposal in proposals for key in proposal.members],
+        "held": [int(key) for key in held],
     }
     with store.writing(_DISCOVER, detail) as change:
-        pass
+        changes.continue_from(change, continues)
     return change.version
+
+
+def discovered_ids(store: Store) -> Ids:
+    """Return ids of the movements that discoveries brought, and nothing else, as far as that was not taken back."""
+    brought: set[int] = set()
+    for version in in_effect(store):
+        if version.action == _DISCOVER:  # those of earlier programs do not say what was held
+            brought |= {*version.detail["movements"]} - {*version.detail.get("held", version.detail["movements"])}
+    now = read.returned_ids(store) if brought else {}
+    return np.intersect1d(read.all_ids(store), np.array([now.get(key, key) for key in brought], dtype=np.int64))
 
 
 def stored_proposals(store: Store) -> list[NamedProposal]:

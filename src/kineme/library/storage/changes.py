@@ -9,7 +9,7 @@ from typing import Any
 from kineme.errors import SpecificationError
 from kineme.library.storage.read import as_ids
 from kineme.library.storage.rows import Database, Row, among, check_text, listed, next_key, parsed_column, select
-from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
+from kineme.library.storage.schema import COLUMNS, CONTINUES, MAX_DOCUMENT
 from kineme.library.storage.store import NOW, Change, Store, repeated
 from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
 from kineme.validation import check_choice, check_number
@@ -62,10 +62,11 @@ def delete_symbol(store: Store, who: str) -> int:
 
 
 @repeated
-def delete_movements(store: Store, ids: Any) -> int:
-    """Delete movements; a symbol whose prototype is among them loses it."""
+def delete_movements(store: Store, ids: Any, continues: int | None = None) -> int:
+    """Delete movements; a symbol whose prototype is among them loses it. `continues` as in `assign`."""
     wanted = as_ids(store, ids)
     with store.writing("delete", {"movements": len(wanted), "first": int(wanted[0])}) as change:
+        continue_from(change, continues)
         keys = {"keys": listed(wanted)}
         _leave(change, among("movement"), keys)
         for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys):
@@ -124,10 +125,19 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
 
 
 @repeated
-def assign(
-    store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None, description: str | None = None
+def assign(  # noqa: PLR0913, PLR0917 - what a symbol gets
+    store: Store,
+    ids: Any,
+    who: str,
+    how: str = "anchored",
+    medoid: int | None = None,
+    description: str | None = None,
+    continues: int | None = None,
 ) -> int:
-    """Assign movements to a symbol, created if needed, then with the medoid as prototype; they leave the one before."""
+    """Assign movements to a symbol, created if needed, then with the medoid as prototype; they leave the one before.
+
+    `continues` is the version that the same call made before, if any: an undo takes back both.
+    """
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
     values: dict[str, Any] = {}
@@ -137,6 +147,7 @@ def assign(
     with store.writing("assign") as change:
         state = _find(change.connection, who)
         change.detail.update(symbol=who if state is None else state[_NAME], movements=len(wanted), how=how, **values)
+        continue_from(change, continues)
         key = make(change, check_name(who)) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])
@@ -155,6 +166,12 @@ def release(store: Store, ids: Any) -> int:
     with store.writing("release", {"movements": len(wanted)}) as change:
         _forget_prototypes(change, _leave(change, among("movement"), {"keys": listed(wanted)}))
     return change.version
+
+
+def continue_from(change: Change, before: int | None) -> None:
+    """Note the version that the same call made before, if any, so that an undo takes back both."""
+    if before is not None:
+        change.detail[CONTINUES] = before
 
 
 def _replace_state(change: Change, state: Row, **values: Any) -> None:

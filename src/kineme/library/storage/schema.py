@@ -21,7 +21,7 @@ MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # largest number of bytes of a name, 
 LARGEST_ID = (1 << 62) - 1  # of versions and rows; adding one does not overflow in SQLite and NumPy
 UNDO, RESTORE = "undo", "restore"
 RETURNS = (UNDO, RESTORE)  # actions of versions with the state of an earlier one, "to" in their detail
-CONTINUES = "continues"  # in the detail of a version: the one before it, which was learned in the same call
+CONTINUES = "continues"  # in the detail of a version: the one before it, which the same call made
 PAGE_SIZE = 32768  # a row of features fills at most a seventh of it, so that little of a page is unused
 
 #: Keys of the table `meta`; those of the second are written with the first movement, "channels" if they are known.
