@@ -31,6 +31,7 @@ from kineme.movements.tables.time_stamps import words_of
 from kineme.movements.trajectories.movements import axis_names
 
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
+_ALONE = frozenset({*POSITIONS, "q"})  # names that are labels beside others, as of letters, but not of one array alone
 
 
 def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, many: str = "refuse") -> Parsed:
@@ -44,9 +45,15 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
     movements = _of_one_array(movements, layout)
+    named_alone = len(movements) == 1 and movements[0].label is None
+    unnamed = _ALONE if named_alone else ()
+    movements = [
+        movement._replace(label=movement.label or (None if movement.name in unnamed else movement.name))
+        for movement in movements
+    ]
     stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
     if not stamped:
-        return _bare(movements, layout, kind)
+        return _bare(movements, layout, kind)._replace(named_alone=named_alone)
     movements = [_plainly_named(movement) for movement in movements]
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
@@ -70,7 +77,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
-    return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
+    detected = parsed.detected._replace(ignored=(*parsed.detected.ignored, *static))
+    return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None)
 
 
 def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
@@ -85,7 +93,7 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
     if (
         len({len(part) for part in parts}) != 1
         or differing != [[str(k) for k in range(len(places))]]
-        or len({movement.label for movement in movements}) > 1
+        or len({movement.label or movement.name for movement in movements}) > 1
     ):
         return movements
     if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in movements[0].entries.values()):

@@ -39,7 +39,8 @@ _STRUCTURAL = frozenset(
         "data", "movements", "demos", "trials", "values", "samples", "points", "frames", "inputs", "payload", "train",
         "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
         "gestures", "actions", "motions", "strokes", "sequences", "episodes", "trajectories", "items", "results",
-        "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates",
+        "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates", "pos", "position", "positions",
+        "xy", "xyz", "coords", "coordinates", "joints",
     }
 )  # fmt: skip
 _DRAWN = frozenset({"points", "point", "strokes"})
@@ -78,12 +79,13 @@ def seconds_named(name: str) -> float | None:
 
 
 class TreeMovement(NamedTuple):
-    """A movement in a tree: its place, its label if known, its arrays by name, empty for a bare one, and its rate."""
+    """A movement in a tree: its place, the label that is said, its arrays by name ("" of a bare one), and its rate."""
 
     place: str
     label: str | None
     entries: dict[str, Any]
     rate: Rate | None = None
+    name: str | None = None  # the outermost one above it that may be a label
 
     @property
     def length(self) -> int:
@@ -150,11 +152,13 @@ def _of_group(
         if name in stamps:
             continue
         own = f"{place}/{name}" if place else name
-        for movement in _of_array(array, own, label or label_of(name), labels.get(name, ("", ()))[1]):
+        for movement in _of_array(array, own, label, labels.get(name, ("", ()))[1]):
             timed = {"time": times[name]} if name in times else {}
-            yield movement._replace(entries=timed | movement.entries, rate=getattr(array, "rate", None) or rate)
+            own_rate = getattr(array, "rate", None) or rate
+            yield movement._replace(entries=timed | movement.entries, rate=own_rate, name=label_of(name))
     for name, array in groups.items():
-        yield from movements_in(array, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
+        for movement in movements_in(array, style, f"{place}/{name}" if place else name, label, rate):
+            yield movement._replace(name=label_of(name) or movement.name)
 
 
 def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]:
