@@ -285,6 +285,12 @@ def test_an_axis_that_is_a_list_runs_over_time():
 def test_tables_of_records_have_their_columns():
     records = np.rec.fromarrays([T, *X.T], names="t,x,y")
     np.testing.assert_array_equal(read(npy(records), "a.npy").demonstrations[0].positions, X)
+    days = [f"2026-05-04T10:00:0{t}" for t in T]
+    texts = np.rec.fromarrays([days, *X.T, [b"wave"] * 5 + [b"nod"] * 5, ["ok"] * 10], names="time,x,y,label,note")
+    recordings = read(npy(texts), "a.npy")
+    assert recordings.labels.tolist() == ["wave", "nod"]
+    np.testing.assert_allclose(recordings.demonstrations.durations, 0.4, atol=1e-6)
+    assert recordings.detected[0][0].ignored == ("note",)
 
 
 def _points(rise, upper=True, first=0, last=30):

@@ -112,8 +112,15 @@ def movements_in(
 
 
 def is_array(tree: Any) -> bool:
-    """Tell whether a tree is an array of numbers with at least two samples' worth of structure, or of dates."""
-    return hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0 and tree.dtype.kind in "biufmMO"
+    """Tell whether a tree is an array of numbers with at least two samples' worth of structure, of dates, or texts."""
+    if not (hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0):
+        return False
+    return tree.dtype.kind in "biufmM" or (is_text(tree) and len(tree.shape) == 1)
+
+
+def is_text(array: Any) -> bool:
+    """Tell whether an array is of texts."""
+    return array.dtype.kind in "OSU"
 
 
 def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] = ()) -> Iterator[TreeMovement]:
@@ -133,7 +140,7 @@ def _of_group(
     arrays = {
         name: branch
         for name, branch in tree.items()
-        if is_array(branch) and branch.dtype.kind != "O" and name not in of_labels and not _is_rate(name, tree)
+        if is_array(branch) and not is_text(branch) and name not in of_labels and not _is_rate(name, tree)
     }
     groups = {
         name: branch for name, branch in tree.items() if isinstance(branch, (Mapping, list)) and name not in of_labels
