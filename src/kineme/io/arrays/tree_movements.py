@@ -31,7 +31,6 @@ from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
-_ALONE = frozenset({*POSITIONS, "q"})  # names that are labels beside others, as of letters, but not of one array alone
 
 
 def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, many: str = "refuse") -> Parsed:
@@ -46,7 +45,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         raise DataError(f"expected arrays times and positions, got {got}")
     movements = _of_one_array(movements, layout)
     named_alone = len(movements) == 1 and movements[0].label is None
-    unnamed = _ALONE if named_alone else ()
+    # Beside others x may be a label, as of letters, but not where it is the only name.
+    unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
     movements = [
         movement._replace(label=movement.label or (None if movement.name in unnamed else movement.name))
         for movement in movements
