@@ -30,6 +30,7 @@ from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
+_OF_RATE = "\0rate"  # owner of the times that follow from a rate, which no array is called
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
@@ -64,8 +65,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
-        heads, owners = (*heads, STAMP), (*owners, STAMP)
-    kinds = ["text" if owner != STAMP and is_text(first.entries[owner]) else "number" for owner in owners]
+        heads, owners = (*heads, STAMP), (*owners, _OF_RATE)
+    kinds = ["text" if owner != _OF_RATE and is_text(first.entries[owner]) else "number" for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
@@ -221,7 +222,7 @@ def _table(
 def _part(movement: TreeMovement, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
     """Return an array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
     width, of_texts, of_time = kind
-    if name == STAMP:
+    if name == _OF_RATE:
         stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
         return stamps[:, None], "" if movement.rate else "expected a rate as others have, got none"
     entry = movement.entries.get(name)
