@@ -122,6 +122,54 @@ def test_times_say_which_axis_of_three_is_time(tmp_path, kind, name):
         assert len(read_recordings(path.with_suffix(".npz"))) == 7
 
 
+def write(path, arrays):
+    """Write arrays in the format that the ending of the path says."""
+    if path.suffix == ".npz":
+        np.savez(path, **arrays)
+    elif path.suffix == ".mat":
+        savemat(
+            path, {name: array.astype(object) if array.dtype.kind == "U" else array for name, array in arrays.items()}
+        )
+    elif path.suffix == ".json":
+        path.write_text(json.dumps(arrays, default=np.ndarray.tolist))
+    else:
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file.update(
+                {name: array.astype("S") if array.dtype.kind == "U" else array for name, array in arrays.items()}
+            )
+
+
+@pytest.mark.parametrize("shape", [(40,), (1, 40), (40, 1), (4, 40)])
+@pytest.mark.parametrize("name", ["times", "timestamps"])
+@pytest.mark.parametrize("kind", ["npz", "json", "mat", "h5"])
+def test_times_of_many_movements_are_never_one_second_each(tmp_path, kind, name, shape):
+    t, path = np.arange(40) / 50, tmp_path / f"a.{kind}"
+    sets = np.stack([np.column_stack((np.sin(t + k), (k + 1) * t)) for k in range(4)])
+    arrays = {"positions": sets, name: np.tile(t, (4, 1)) if shape == (4, 40) else t.reshape(shape)}
+    write(path, arrays | {"labels": np.array(["wave", "nod"] * 2)})
+    recordings = read_recordings(path)
+    np.testing.assert_allclose(recordings.demonstrations.durations, [0.78] * 4)
+    assert recordings.labels.tolist() == ["wave", "nod"] * 2
+    np.testing.assert_array_equal(recordings.demonstrations[1].positions, sets[1])
+    square = {name: np.arange(1, 5)[:, None] * np.arange(4.0), "positions": sets[:, :4]}  # of as many as their samples
+    if kind != "mat":  # in which the samples of matrices lie along the longer axis
+        write(path, square)
+        np.testing.assert_allclose(read_recordings(path).demonstrations.durations, [3, 6, 9, 12])
+    write(path, arrays | {name: t[:30]})
+    with pytest.raises(kineme.errors.DataError, match=r"expected times of (the 4 movements of 40 samples|shape)"):
+        read_recordings(path)
+
+
+def test_a_cell_of_times_is_that_of_a_cell_of_movements(tmp_path):
+    cells = np.empty((2, 2), dtype=object)
+    for k, length in enumerate((10, 20)):
+        cells[0, k], cells[1, k] = np.random.default_rng(k).normal(size=(length, 2)), np.arange(length) / 50
+    write(tmp_path / "a.mat", {"data": cells[0], "times": cells[1], "labels": np.array(["wave", "nod"])})
+    recordings = read_recordings(tmp_path / "a.mat")
+    np.testing.assert_allclose(recordings.demonstrations.durations, [0.18, 0.38])
+    assert recordings.labels.tolist() == ["wave", "nod"]
+
+
 @pytest.mark.parametrize(
     ("labels", "expected"), [([b"a", b"b"], ("a", "b")), (["a", "b"], ("a", "b")), ([1, 2], ("1", "2"))]
 )

@@ -1,9 +1,11 @@
 """Folders of recordings: labels, order, links, and files that cannot be read or vanish meanwhile."""
 
+import json
 import os
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kineme
@@ -48,6 +50,26 @@ def test_hidden_files_and_folders_are_passed_over(tmp_path):
     read = read_recordings(tmp_path)
     assert [source.path for source in read.sources] == ["wave/a.csv"]
     assert read.problems == ()
+
+
+@pytest.mark.parametrize("name", ["positions", "x", "xy", "joints", "hand"])
+def test_a_folder_wins_over_the_name_of_the_one_array_of_a_file(tmp_path, name):
+    scipy_io, h5py = pytest.importorskip("scipy.io"), pytest.importorskip("h5py")
+    t = np.arange(20) / 50
+    arrays = {name: np.column_stack((t, t**2)), "fs": 50.0}
+    for label in ("wave", "nod"):
+        (tmp_path / label).mkdir()
+        np.savez(tmp_path / label / "0.npz", **arrays)
+        (tmp_path / label / "1.json").write_text(json.dumps(arrays, default=np.ndarray.tolist))
+        scipy_io.savemat(tmp_path / label / "2.mat", arrays)
+        with h5py.File(tmp_path / label / "3.h5", "w") as file:
+            file.update(arrays)
+    assert read_recordings(tmp_path).labels.tolist() == ["nod"] * 4 + ["wave"] * 4
+    (tmp_path / "two").mkdir()
+    np.savez(tmp_path / "two" / "0.npz", circle=arrays[name], bow=arrays[name], fs=50.0)
+    assert read_recordings(tmp_path / "two").labels.tolist() == ["circle", "bow"]
+    (label,) = read_recordings(tmp_path / "wave" / "0.npz").labels
+    assert label == ("hand" if name == "hand" else None)
 
 
 def test_a_single_file_has_no_label_and_its_own_name_as_path(tmp_path):

@@ -186,6 +186,23 @@ def test_rates_and_scales_are_those_of_the_attributes_and_records_are_columns(tm
         assert recordings.labels.tolist() == (["wave", "nod"] if name == "sets" else ["hand"])
 
 
+def test_columns_of_texts_are_labels_or_named_among_those_left_aside(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    kinds = [("t", float), ("x", float), ("y", float), ("label", "S4"), ("trial", h5py.string_dtype()), ("note", "S2")]
+    records = np.zeros(40, kinds)
+    records["t"], records["x"], records["y"] = np.tile(np.arange(10) / 10, 4), np.arange(40), np.arange(40) ** 2
+    records["label"], records["note"] = np.repeat([b"wave", b"nod"], 20), b"ok"
+    records["trial"] = np.repeat(["a", "b", "c", "d"], 10)
+    with h5py.File(tmp_path / "table.h5", "w") as table, h5py.File(tmp_path / "columns.h5", "w") as columns:
+        table["hand"] = records
+        for name in records.dtype.names:
+            columns[name] = records[name]
+    for name in ("table", "columns"):
+        recordings = kineme.read_recordings(tmp_path / f"{name}.h5")
+        assert recordings.labels.tolist() == ["wave", "wave", "nod", "nod"]
+        assert (recordings.detected[0][0].movement, recordings.detected[0][0].ignored) == (("trial",), ("note",))
+
+
 def test_labels_that_take_much_more_than_the_file_are_refused(tmp_path):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -164,6 +164,13 @@ def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
     np.testing.assert_array_equal(alone.demonstrations[0].positions, CELLS_X)
 
 
+def test_cells_of_texts_are_a_column_of_labels(tmp_path):
+    labels = np.array(["wave"] * 20 + [""] * 4 + ["nod"] * 16, dtype=object)
+    t = np.arange(40) / 50
+    recordings = read_mat(tmp_path, t=t, x=np.sin(t), y=t**2, label=labels)
+    assert [source.label for source in recordings.sources] == ["wave", "a", "nod"]  # without one, the file's name
+
+
 def test_matrices_with_their_own_times_win_over_the_longer_axis(tmp_path):
     few = np.arange(5) / 5
     wide = np.arange(40.0).reshape(8, 5)

@@ -51,6 +51,19 @@ def test_samples_with_names_are_a_table():
     np.testing.assert_array_equal(read(lines, "a.jsonl").demonstrations.positions, X)
 
 
+def test_a_head_as_kineme_writes_it_is_that_of_times():
+    columns = {"time [s]": T, "x": X[:, 0], "y": X[:, 1]}
+    samples = [dict(zip(columns, row, strict=True)) for row in np.column_stack([*columns.values()]).tolist()]
+    lines, records = "\n".join(map(json.dumps, samples)), np.zeros(len(T), [(name, float) for name in columns])
+    for name, column in columns.items():
+        records[name] = column
+    for data, name in ((npz(**columns), "a.npz"), (npy(records), "a.npy"), (lines, "a.jsonl")):
+        recordings = read(data, name)
+        np.testing.assert_array_equal(recordings.demonstrations[0].times, T)
+        np.testing.assert_array_equal(recordings.demonstrations[0].positions, X)
+        assert recordings.detected[0][0].time == "time [s]"
+
+
 def test_samples_may_carry_labels_movements_vectors_and_objects():
     long = [sample | {"demo": k // 5, "label": "wave"} for k, sample in enumerate(SAMPLES)]
     recordings = read_json(long)
@@ -285,6 +298,12 @@ def test_an_axis_that_is_a_list_runs_over_time():
 def test_tables_of_records_have_their_columns():
     records = np.rec.fromarrays([T, *X.T], names="t,x,y")
     np.testing.assert_array_equal(read(npy(records), "a.npy").demonstrations[0].positions, X)
+    days = [f"2026-05-04T10:00:0{t}" for t in T]
+    texts = np.rec.fromarrays([days, *X.T, [b"wave"] * 5 + [b"nod"] * 5, ["ok"] * 10], names="time,x,y,label,note")
+    recordings = read(npy(texts), "a.npy")
+    assert recordings.labels.tolist() == ["wave", "nod"]
+    np.testing.assert_allclose(recordings.demonstrations.durations, 0.4, atol=1e-6)
+    assert recordings.detected[0][0].ignored == ("note",)
 
 
 def _points(rise, upper=True, first=0, last=30):

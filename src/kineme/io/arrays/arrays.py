@@ -199,6 +199,7 @@ def first_named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = first_named(arrays, TIMES)
     t = None if key is None else numbers_of(arrays[key], of_time=True)
+    t = t.ravel() if t is not None and t.ndim == 2 and t.shape != x.shape[:2] and 1 in t.shape else t
     if x.ndim == 3 and t is None and first_named(arrays, LABELS) is None:
         xs = sets_or_points(list(x), layout.every)
         x = x if len(xs) == len(x) else xs[0]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.arrays.trees import Rate, is_label, rate_of, seconds_named
+from kineme.io.arrays.trees import Rate, rate_of, seconds_named
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as, needs
 
@@ -23,7 +23,7 @@ _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
-_LETTERS = 2**20  # of labels, at most
+_LETTERS, _LONGEST = 2**20, 256  # of labels in all at most, or on average
 _SCALE = frozenset({"conversion", "offset"})  # attributes by which samples are multiplied, and which is added
 _UNITS = frozenset({"unit", "units"})  # attributes
 _NAMES = frozenset({"label", "task"})  # attributes
@@ -75,22 +75,42 @@ def hdf5_tree(group: Any, counted: list[int] | None = None, depth: int = 0, unit
                 tree[name] = _Stored(member, (_unit_in(member, names) if names else None) or unit, rate, names)
             elif member.dtype.names and len(member.shape) == 1:
                 check_expanded(member.shape[0] * member.dtype.itemsize)
-                records = _Stored(member, None, None)[()]
-                tree[name] = {head: records[head] for head in member.dtype.names if member.dtype[head].kind in "biuf"}
-            elif len(member.shape) == 1 and member.dtype.kind in "SO" and is_label(name):
-                tree[name] = texts_of(member)
+                heads = member.dtype.names
+                numbers = tuple(head for head in heads if member.dtype[head].kind in "biuf")
+                records: Any = _Stored(member, None, None)[numbers] if numbers else None
+                tree[name] = {head: records[head] if len(numbers) > 1 else records for head in numbers}
+                texts = [head for head in heads if h5py.check_string_dtype(member.dtype[head]) is not None]
+                tree[name] |= {head: _Texts(member, head) for head in texts}
+            elif len(member.shape) == 1 and h5py.check_string_dtype(member.dtype) is not None:
+                tree[name] = _Texts(member)
     return tree
 
 
-def texts_of(stored: Any) -> list[str | float | None]:
-    """Read the texts of a data set, one by one: all may be the same large one in the file."""
-    n_letters, labels = stored.shape[0] * max(1, stored.dtype.itemsize), []
+def texts_of(stored: Any, head: str | None = None) -> list[str | float | None]:
+    """Read the texts of a data set, or of a column of it; of any length one by one: all may be the same large one."""
+    dtype = stored.dtype if head is None else stored.dtype[head]
+    n_letters, labels = stored.shape[0] * max(1, dtype.itemsize), list[str | float | None]()
+    most = max(_LETTERS, _LONGEST * stored.shape[0])
     for k in range(stored.shape[0]):
-        if n_letters > _LETTERS:
-            raise DataError(f"expected labels of at most {_LETTERS:,} letters in all in {stored.name}, got more")
-        labels.append(_single(stored[k]))
+        if n_letters > most:
+            raise DataError(f"expected labels of at most {most:,} letters in all in {stored.name}, got more")
+        if dtype.kind == "S":
+            return [_single(text) for text in (stored[()] if head is None else stored[head]).tolist()]
+        labels.append(_single(stored[k] if head is None else stored[head, k]))
         n_letters += len(str(labels[-1]))
     return labels
+
+
+class _Texts:
+    """The texts of a data set, or of a column of it, that are read when they are needed."""
+
+    dtype = np.dtype(object)
+
+    def __init__(self, stored: Any, head: str | None = None) -> None:
+        self._stored, self._head, self.shape = stored, head, stored.shape
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.array(texts_of(self._stored, self._head), dtype=object)
 
 
 def _label_and_rate(stored: Any, names: Iterable[str]) -> dict[str, Any]:

@@ -119,7 +119,9 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: 
         return text(matrix, order)
     if matrix.kind == CELL:
         cells = _children(matrix, order, math.prod(matrix.dims), 0)
-        return [_node(cell, order, taken, depth + 1, wanted) for cell in cells]
+        nodes = [_node(cell, order, taken, depth + 1, wanted) for cell in cells]
+        of_texts = len(nodes) > 1 and {*map(type, nodes)} - {type(None)} == {str}  # of an empty one there is nothing
+        return np.array([text or "" for text in nodes], dtype=object) if of_texts else nodes
     if matrix.kind == STRUCT:
         fields = field_names(matrix, order)
         values = _children(matrix, order, math.prod(matrix.dims) * len(fields), 2)

@@ -22,14 +22,15 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, TreeMovement, movements_in
+from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, TreeMovement, as_label, is_text, movements_in
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
-from kineme.movements.tables.time_stamps import words_of
+from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
+_OF_RATE = "\0rate"  # owner of the times that follow from a rate, which no array is called
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
@@ -44,10 +45,17 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
     movements = _of_one_array(movements, layout)
+    named_alone = len(movements) == 1 and movements[0].label is None
+    # Beside others x may be a label, as of letters, but not where it is the only name.
+    unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
+    movements = [
+        movement._replace(label=movement.label or (None if movement.name in unnamed else movement.name))
+        for movement in movements
+    ]
     stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
     if not stamped:
-        return _bare(movements, layout, kind)
-    movements = [_plainly_named(movement) for movement in movements]
+        return _bare(movements, layout, kind)._replace(named_alone=named_alone)
+    movements = [_with_seconds(_plainly_named(movement)) for movement in movements]
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
@@ -57,8 +65,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
-        heads, owners = (*heads, STAMP), (*owners, STAMP)
-    kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
+        heads, owners = (*heads, STAMP), (*owners, _OF_RATE)
+    kinds = ["text" if owner != _OF_RATE and is_text(first.entries[owner]) else "number" for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
@@ -70,7 +78,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
-    return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
+    detected = parsed.detected._replace(ignored=(*parsed.detected.ignored, *static))
+    return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None)
 
 
 def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
@@ -85,10 +94,10 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
     if (
         len({len(part) for part in parts}) != 1
         or differing != [[str(k) for k in range(len(places))]]
-        or len({movement.label for movement in movements}) > 1
+        or len({movement.label or movement.name for movement in movements}) > 1
     ):
         return movements
-    if any(_is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in movements[0].entries.values()):
+    if any(is_text(entry) or (names != [""] and len(entry.shape) > 1) for entry in movements[0].entries.values()):
         return movements
     check_expanded(8 * sum(int(np.prod(entry.shape)) for movement in movements for entry in movement.entries.values()))
     several = [[numbers_of(np.asarray(entry)) for entry in movement.entries.values()] for movement in movements]
@@ -139,6 +148,22 @@ def _plainly_named(movement: TreeMovement) -> TreeMovement:
     return movement
 
 
+def _with_seconds(movement: TreeMovement) -> TreeMovement:
+    """Return times that are texts, if no others are there, as the seconds, which their head then says."""
+    times = [name for name in movement.entries if is_time(name)]
+    if len(times) != 1 or not is_text(movement.entries[times[0]]) or not any(_texts(movement.entries[times[0]])):
+        return movement
+    seconds, odd = seconds_of_dates(_texts(movement.entries[times[0]]))
+    if odd:
+        raise DataError(f"expected dates or durations in {times[0]!r}, got {next(iter(odd.values()))!r:.80}")
+    others = {name: entry for name, entry in movement.entries.items() if name != times[0]}
+    return movement._replace(entries={f"{times[0]} (s)": seconds} | others)
+
+
+def _texts(array: Any) -> list[str]:
+    return [as_label(value) or "" for value in np.asarray(array, dtype=object).tolist()]
+
+
 def heads_of_array(name: str, shape: Sequence[int]) -> list[str]:
     """Return a head for each column of an array: points by their axes, other columns by their numbers."""
     width = math.prod(shape[1:])
@@ -152,10 +177,6 @@ def heads_of_array(name: str, shape: Sequence[int]) -> list[str]:
     if words_of(name)[-1:] and words_of(name)[-1] in _POINTS and width in (2, 3):
         ends = "xyz"[:width]
     return [f"{name}.{end}" for end in ends]
-
-
-def _is_text(entry: Any) -> bool:
-    return entry.dtype.kind in "OU"
 
 
 def _units_of(array: Any, width: int) -> list[str]:
@@ -180,7 +201,7 @@ def _table(
     arrays: dict[str, Any] = {}
     for name, is_coordinate in needed.items():
         several = []
-        of_texts = name in first.entries and _is_text(first.entries[name])
+        of_texts = name in first.entries and is_text(first.entries[name])
         for movement, length, start in zip(movements, lengths, offsets, strict=False):
             part, fault = _part(movement, name, length, (widths[name], of_texts, not is_coordinate))
             here, there = (_units_of(each.entries.get(name), widths[name]) for each in (movement, first))
@@ -201,16 +222,16 @@ def _table(
 def _part(movement: TreeMovement, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
     """Return an array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
     width, of_texts, of_time = kind
-    if name == STAMP:
+    if name == _OF_RATE:
         stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
         return stamps[:, None], "" if movement.rate else "expected a rate as others have, got none"
     entry = movement.entries.get(name)
     if entry is None:
         return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"
-    if _is_text(entry) and not of_texts:  # of nulls alone
+    if is_text(entry) and not of_texts:  # of nulls alone
         return np.full((length, width), np.nan), f"expected numbers in {name!r}, got none"
-    if _is_text(entry):
-        return np.asarray(entry, dtype=object).reshape(-1, 1), ""
+    if is_text(entry):
+        return np.array([[text] for text in _texts(entry)], dtype=object), ""
     if entry.shape[0] != length or int(np.prod(entry.shape[1:])) != width:
         got = f"expected {name!r} of shape {(length, width)}, got {tuple(entry.shape)}"
         return np.full((length, width), np.nan), got

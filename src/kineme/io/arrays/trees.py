@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kineme.errors import DataError
+from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import LABEL_WORDS, MOVEMENT_WORDS, is_time
 from kineme.movements.tables.time_stamps import PER_SECOND, TIME_UNITS, unit_by_size, words_of
 from kineme.units import UNITS
@@ -39,7 +40,8 @@ _STRUCTURAL = frozenset(
         "data", "movements", "demos", "trials", "values", "samples", "points", "frames", "inputs", "payload", "train",
         "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
         "gestures", "actions", "motions", "strokes", "sequences", "episodes", "trajectories", "items", "results",
-        "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates",
+        "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates", "pos", "position", "positions",
+        "xy", "xyz", "coords", "coordinates", "joints",
     }
 )  # fmt: skip
 _DRAWN = frozenset({"points", "point", "strokes"})
@@ -78,12 +80,13 @@ def seconds_named(name: str) -> float | None:
 
 
 class TreeMovement(NamedTuple):
-    """A movement in a tree: its place, its label if known, its arrays by name, empty for a bare one, and its rate."""
+    """A movement in a tree: its place, the label that is said, its arrays by name ("" of a bare one), and its rate."""
 
     place: str
     label: str | None
     entries: dict[str, Any]
     rate: Rate | None = None
+    name: str | None = None  # the outermost one above it that may be a label
 
     @property
     def length(self) -> int:
@@ -110,8 +113,15 @@ def movements_in(
 
 
 def is_array(tree: Any) -> bool:
-    """Tell whether a tree is an array of numbers with at least two samples' worth of structure, or of dates."""
-    return hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0 and tree.dtype.kind in "biufmMO"
+    """Tell whether a tree is an array of numbers with at least two samples' worth of structure, of dates, or texts."""
+    if not (hasattr(tree, "dtype") and hasattr(tree, "shape") and len(tree.shape) > 0):
+        return False
+    return tree.dtype.kind in "biufmM" or (is_text(tree) and len(tree.shape) == 1)
+
+
+def is_text(array: Any) -> bool:
+    """Tell whether an array is of texts."""
+    return array.dtype.kind in "OSU"
 
 
 def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] = ()) -> Iterator[TreeMovement]:
@@ -125,16 +135,18 @@ def _of_array(array: Any, place: str, label: str | None, labels: Sequence[str] =
 def _of_group(
     tree: Mapping[str, Any], style: str, place: str, label: str | None, rate: Rate | None
 ) -> Iterator[TreeMovement]:
+    tree = dict(tree)  # of an archive, which decodes an array whenever it is asked for
     label = _own_label(tree) or label
     labels = _labels_of_sets(tree)
-    of_labels = {name for name, _ in labels.values()}
+    stamped = _stamps_of_sets(tree)
+    aside = {name for name, _ in (*labels.values(), *stamped.values())}
     arrays = {
         name: branch
         for name, branch in tree.items()
-        if is_array(branch) and branch.dtype.kind != "O" and name not in of_labels and not _is_rate(name, tree)
+        if is_array(branch) and not is_text(branch) and name not in aside and not _is_rate(name, tree)
     }
     groups = {
-        name: branch for name, branch in tree.items() if isinstance(branch, (Mapping, list)) and name not in of_labels
+        name: branch for name, branch in tree.items() if isinstance(branch, (Mapping, list)) and name not in aside
     }
     said = {array.rate for array in arrays.values() if getattr(array, "rate", None) is not None}
     rate = rate_of(tree) or (said.pop() if len(said) == 1 else rate)
@@ -142,7 +154,8 @@ def _of_group(
     times = {owner: arrays[name] for name, owner in owners.items()}  # ``wave_t`` of ``wave``
     stamps = {name for name, owner in owners.items() if owner in arrays}
     own_times = all(name in times or name in stamps for name in arrays)
-    if arrays and not own_times and not labels and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
+    plain = not own_times and not labels and not stamped
+    if arrays and plain and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
         entries = {inner: entry for inner, entry in flat(tree, style) if _fits(entry)}
         yield TreeMovement(place, label, {k: entry for k, entry in entries.items() if not _is_rate(k, entries)}, rate)
         return
@@ -150,25 +163,85 @@ def _of_group(
         if name in stamps:
             continue
         own = f"{place}/{name}" if place else name
-        for movement in _of_array(array, own, label or label_of(name), labels.get(name, ("", ()))[1]):
+        for k, movement in enumerate(_of_array(array, own, label, labels.get(name, ("", ()))[1])):
             timed = {"time": times[name]} if name in times else {}
-            yield movement._replace(entries=timed | movement.entries, rate=getattr(array, "rate", None) or rate)
+            if name in stamped:
+                timed = {stamped[name][0]: stamped[name][1][k]}
+            own_rate = getattr(array, "rate", None) or rate
+            yield movement._replace(entries=timed | movement.entries, rate=own_rate, name=label_of(name))
     for name, array in groups.items():
-        yield from movements_in(array, style, f"{place}/{name}" if place else name, label or label_of(name), rate)
+        below = movements_in(array, style, f"{place}/{name}" if place else name, label, rate)
+        for k, movement in enumerate(below):
+            timed = {stamped[name][0]: stamped[name][1][k]} if name in stamped else {}
+            own_label = labels[name][1][k] if name in labels else movement.label
+            entries = timed | movement.entries
+            yield movement._replace(label=own_label, entries=entries, name=label_of(name) or movement.name)
+
+
+def _lengths(branch: Any) -> list[int]:
+    """Return the numbers of samples in a set of movements, (n, T, d) or a list of arrays; nothing of anything else."""
+    if isinstance(branch, list):
+        are_arrays = all(is_array(each) and not is_text(each) and len(each.shape) <= 2 for each in branch)
+        return [each.shape[0] for each in branch] if are_arrays else []
+    is_set = is_array(branch) and len(branch.shape) == 3 and branch.dtype != np.uint8  # else an image
+    check_expanded(8 * branch.shape[0] if is_set else 0)  # of HDF5, a set may be declared that was never written
+    return [branch.shape[1]] * branch.shape[0] if is_set else []
+
+
+def _stamps_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[Any]]]:
+    """Give for sets of movements the array of their times, (T,) or (n, T) or a list, and the times of each movement."""
+    clocks = {
+        name: branch for name, branch in tree.items() if is_time(name) and (_size(branch) > 1 or _lengths(branch))
+    }
+    sets = {name: lengths for name, branch in tree.items() if name not in clocks and (lengths := _lengths(branch))}
+    if not clocks or not sets:
+        return {}
+    spans = {clock.shape[0] for clock in clocks.values() if not isinstance(clock, list) and len(clock.shape) == 1}
+    for name, branch in tree.items():  # whose samples those of the clock are, unless they are those of movements
+        if name not in clocks and is_array(branch) and branch.shape[0] in spans - {*sets.get(name, ())}:
+            return {}
+    stamped = {}
+    for name, lengths in sets.items():
+        of_clocks = ((clock, _stamps(branch, lengths)) for clock, branch in clocks.items())
+        fitting = next((each for each in of_clocks if each[1]), None)
+        if fitting is not None:
+            stamped[name] = fitting
+        elif rate_of(tree) is None:
+            clock, branch = next(iter(clocks.items()))
+            got = f"a list of {len(branch)}" if isinstance(branch, list) else f"shape {branch.shape}"
+            samples = f"{len(lengths)} movements of {' or '.join(map(str, sorted({*lengths})[:3]))} samples in {name!r}"
+            raise DataError(f"expected times of the {samples}, got {clock!r} of {got}; save one for each sample")
+    return stamped
+
+
+def _size(branch: Any) -> int:
+    return math.prod(branch.shape) if is_array(branch) and not is_text(branch) else 0
+
+
+def _stamps(clock: Any, lengths: Sequence[int]) -> list[Any]:
+    """Return the times of each movement of so many samples; nothing where they do not fit."""
+    if isinstance(clock, list):
+        return [np.ravel(each) for each in clock] if [*map(_size, clock)] == [*lengths] else []
+    n, length = len(lengths), lengths[0]
+    if {*lengths} != {length} or clock.shape not in {(length,), (1, length), (length, 1), (n, length), (length, n)}:
+        return []
+    times = np.asarray(clock)
+    times = times.T if clock.shape == (length, n) != (n, length) else times.reshape(-1, length)
+    return [*np.broadcast_to(times, (n, length))]
 
 
 def _labels_of_sets(tree: Mapping[str, Any]) -> dict[str, tuple[str, list[str]]]:
-    """Give for arrays of movements (n, T, d) the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
+    """Give for sets of movements the array that labels them, ``y`` of ``X``, ``y_train`` of ``X_train``."""
     labels = {}
-    for name, array in tree.items():
-        if not is_array(array) or len(array.shape) != 3:
+    for name, branch in tree.items():
+        if not (n := len(_lengths(branch))):
             continue
         ending = words_of(name)[1:]
         for other, values in tree.items():
-            shape = np.shape(values)
-            if not is_label(other) or words_of(other)[1:] not in {ending, ()}:
+            if not is_label(other) or words_of(other)[1:] not in {ending, ()} or _lengths(values):
                 continue
-            if math.prod(shape) == array.shape[0] == max(shape, default=0):
+            shape = np.shape(values)
+            if math.prod(shape) == n == max(shape, default=0):
                 texts = ["" if text is None else text for text in map(as_label, np.asarray(values).ravel().tolist())]
                 labels[name] = (other, texts)
     return labels

@@ -92,10 +92,10 @@ def _selected(read: FileRead, layout: Layout) -> FileRead:
         return read
     parsed = Parsed(read.detected, read.block)
     try:
-        detected, block, _ = select_columns(in_order, layout)
+        selected = select_columns(in_order, layout)
     except DataError as error:
         return read._replace(block=NO_MOVEMENTS, problems=[Problem(read.path, None, str(error)), *read.problems])
-    return read._replace(detected=detected, block=block)
+    return read._replace(detected=selected.detected, block=selected.block)
 
 
 def notes_on_clocks(files: Sequence[Placed]) -> tuple[str, ...]:

@@ -100,7 +100,7 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             if layout.rows and not form.has_lines:
                 raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
             parsed = select_columns(parse, layout)
-            detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
+            detected, block, left_out, named_alone = parsed if layout.every is None else in_blocks(parsed, layout.every)
             if layout.measured_in is not None:
                 units = detected.measured_in or [""] * len(detected.columns)
                 named = zip(units, detected.columns, strict=True)
@@ -111,8 +111,9 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
         return FileRead(name, []).without_movements(_plainly(error))
-    label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
-    labels = [label if own is None else _storable(own) for own in block.labels]
+    folder, stem = as_text(relative.parent.name), as_text(relative.stem)
+    label = stem if form.label_is_stem and not (folder and stem.isdecimal()) else folder or None
+    labels = [label if own is None or (folder and named_alone) else _storable(own) for own in block.labels]
     people = block.people and [None if person is None else _storable(person) for person in block.people]
     bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
     block = replace(bare, people=people, repairs=block.repairs)
@@ -245,7 +246,7 @@ def _without_excluded(parsed: Parsed, layout: Layout) -> Parsed:
 
 def take_columns(parsed: Parsed, chosen: Sequence[int]) -> Parsed:
     """Return a file with some of its coordinates, in that order; the others are ignored."""
-    detected, block, _ = parsed
+    detected, block = parsed.detected, parsed.block
     others = {*range(len(detected.columns))} - {*chosen}
     detected = detected._replace(
         columns=tuple(detected.columns[k] for k in chosen),

@@ -192,6 +192,8 @@ class Parsed(NamedTuple):
     block: Block
     # Why parts of it could not be read: topics, episodes. Each becomes a problem of the file.
     left_out: tuple[str, ...] = ()
+    # Whether its label is no more than the name of its one array or group: a folder says better what it is.
+    named_alone: bool = False
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:
