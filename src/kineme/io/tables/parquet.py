@@ -20,7 +20,7 @@ from kineme.io.records import damaged_as
 from kineme.movements.episodes import STATE
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
-from kineme.movements.tables.table import Table
+from kineme.movements.tables.table import Table, as_name
 from kineme.movements.tables.time_stamps import nanoseconds
 from kineme.validation import ROUNDED, Array, too_long_integer
 
@@ -236,7 +236,7 @@ def _text(value: Any, head: str) -> str:
         return value.decode("utf-8", "replace")
     if value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected names in {head!r}, got {value!r}")
-    return "" if value is None else str(value)
+    return as_name(value)
 
 
 def _numbers(column: Any, head: str) -> Any:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 from itertools import pairwise
@@ -30,6 +31,7 @@ from kineme.validation import ROUNDED, Array, too_long_integer
 
 _KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
 _NUMBERS = (Real, Decimal)
+_WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
 class Segments(NamedTuple):
@@ -64,6 +66,9 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     new movement begins where they change or the time decreases. Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
+    names = {*roles.movement, roles.label}
+    columns = [_names(column) if k in names else column for k, column in enumerate(table.columns)]
+    table = replace(table, columns=columns)
     times, units, units_from = _times(table, roles, layout)
     # Refuse several columns of times that do not show the same clock.
     for k in roles.clocks:
@@ -76,8 +81,8 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     n = len(keys)
     people: list[str | None] | None = None
     if roles.person is not None:  # who showed the first sample of each movement
-        names = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
-        people = [str(name) or None for name in names.tolist()]
+        shown = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
+        people = [name or None for name in shown.tolist()]
     rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
     if rows is not None:
         positions, times, codes = positions[rows], times[rows], codes[rows]
@@ -277,6 +282,25 @@ def _texts(values: list[Any]) -> NDArray[Any]:
     texts = np.empty(len(values), dtype=object)
     texts[:] = ["" if _is_missing(value) else str(value) for value in values]
     return texts
+
+
+def as_name(value: Any) -> str:
+    """The text that names a movement, a label or a person; of a whole number without a fraction, empty for none."""
+    if _is_missing(value):
+        return ""
+    is_fraction = isinstance(value, (float, np.floating, Decimal)) and isfinite(value)
+    return str(int(value)) if is_fraction and value == int(value) else str(value)
+
+
+def _names(values: NDArray[Any]) -> NDArray[Any]:
+    """The names in a column; texts lose the fraction of whole numbers if all are such: "1.0" and "2.0", not "1.5"."""
+    several = values.tolist()
+    texts = {value: as_name(value) for value in {*several}}
+    if all(map(_WHOLE.fullmatch, filter(None, texts.values()))):
+        texts = {value: text.partition(".")[0] for value, text in texts.items()}
+    names = np.empty(len(several), dtype=object)
+    names[:] = [texts[value] for value in several]
+    return names
 
 
 def _is_missing(value: Any) -> bool:
