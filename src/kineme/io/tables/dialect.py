@@ -10,6 +10,7 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.table import flags_in
 from kineme.movements.tables.time_stamps import is_date
 from kineme.reporting.text import text_in
 from kineme.units import unit_named
@@ -47,6 +48,7 @@ class Dialect(NamedTuple):
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
     measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
     end: int | None = None  # line after the last sample; None: the end of the file
+    flags: tuple[int, ...] = ()  # columns of numbers that are written as true and false
     names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
@@ -60,8 +62,8 @@ class Dialect(NamedTuple):
             return False
         return len(cells) == len(self.kinds) and all(
             is_number(cell, self.decimal_comma)
-            for cell, kind in zip(cells[1:], self.kinds[1:], strict=True)
-            if kind == "number"
+            for k, (cell, kind) in enumerate(zip(cells, self.kinds, strict=True))
+            if k and kind == "number" and k not in self.flags
         )
 
 
@@ -147,9 +149,17 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
                 f"expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in {where}, got {cell!r:.80}; write "
                 f"them so{'' if heads else ', or name the columns in a first line'}"
             )
+    # The first column without a head is of times, which no flag is.
+    flags = tuple(
+        k
+        for k in range(0 if heads else 1, len(kinds))
+        if flags_in([row[k] for row in body if k < len(row) and not is_missing(row[k])]) is not None
+    )
+    kinds = tuple("number" if k in flags else kind for k, kind in enumerate(kinds))
     if heads:
-        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
-    return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units, flags=flags)
+    names = tuple(f"column {k}" for k in range(len(kinds)))
+    return Dialect(separator, comma, names, False, first, kinds, flags=flags)
 
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:

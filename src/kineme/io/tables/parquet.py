@@ -173,7 +173,7 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     if STATE in lists:
         return {STATE}
     try:
-        kinds = [_kind(kind) for kind in types]
+        kinds = ["text" if pa.types.is_boolean(kind) else _kind(kind) for kind in types]  # flags are beside positions
         choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)
     except DataError:
         if len(lists) > 1:
@@ -215,7 +215,8 @@ def _kind(kind: Any) -> str:
     of = pa.types
     if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
         return "date"
-    return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
+    is_number = of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) or of.is_boolean(kind)
+    return "number" if is_number else "text"
 
 
 def _texts(column: Any, head: str) -> Any:
@@ -240,7 +241,7 @@ def _text(value: Any, head: str) -> str:
 
 
 def _numbers(column: Any, head: str) -> Any:
-    values = column.to_numpy()
+    values = (column.cast(pa.uint8()) if pa.types.is_boolean(column.type) else column).to_numpy()
     if values.dtype.kind in "Mm":
         return nanoseconds(values)
     try:

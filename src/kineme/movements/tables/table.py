@@ -29,8 +29,11 @@ from kineme.movements.tables.time_stamps import (
 )
 from kineme.validation import ROUNDED, Array, too_long_integer
 
-_KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
+# Of NumPy -> of `choose_roles`.
+_KINDS = {"b": "number", "i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
 _NUMBERS = (Real, Decimal)
+#: Cell in lower case -> number.
+FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
 _WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
@@ -262,7 +265,8 @@ def _values(series: Any) -> NDArray[Any]:
 def _kind(values: NDArray[Any]) -> str:
     """Find the kind of a column; one with a number among texts has numbers, and is refused where it is a coordinate."""
     mixed = values.dtype.kind == "O" and (any(map(_is_number, values.tolist())) or _are_decimals(values.tolist()))
-    return "number" if mixed or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
+    are_flags = values.dtype.kind == "O" and flags_in(values.tolist()) is not None
+    return "number" if mixed or are_flags or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
 
 
 def _are_decimals(texts: list[str]) -> bool:
@@ -308,7 +312,17 @@ def _is_missing(value: Any) -> bool:
     return value is None or type(value).__name__ in ("NAType", "NaTType") or is_nan
 
 
+def flags_in(cells: Sequence[Any]) -> NDArray[np.float64] | None:
+    """Numbers for true and false in any case, NaN for empty cells; None if there are other cells, or none of these."""
+    values = {cell: FLAGS.get(str(cell).lower()) for cell in {*cells}}
+    if None in values.values() or not any(map(str, values)):
+        return None
+    return np.array([values[cell] for cell in cells], dtype=np.float64)
+
+
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
+    if values.dtype.kind == "O" and (flags := flags_in(values.tolist())) is not None:
+        return flags
     if _KINDS.get(values.dtype.kind) != "number":
         i, got = next(((i, value) for i, value in enumerate(values.tolist()) if not _is_number(value)), (0, values[0]))
         raise DataError(
