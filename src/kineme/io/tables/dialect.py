@@ -24,7 +24,10 @@ _HEAD = 100_000  # lines among which they are
 _MOST_HEADS = 5  # lines of heads, at most
 _WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
 _CELL = 32  # memory of a cell in Python, per character [bytes]
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_DIGITS = r"[-+]?(\d+\.?\d*|\.\d+)(([eE][-+]?|[dD][-+])\d+)?"
+_NUMBER = re.compile(rf"{_DIGITS}|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_MEASURED = re.compile(rf"{_DIGITS}\s*(?P<unit>[^\s\d.,].*)")  # a number with its unit beside it: 12.3 mm
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d)")  # before an exponent, of double precision
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 _SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
@@ -242,8 +245,21 @@ def is_number(cell: str, comma: bool) -> bool:
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
 
 
+def as_float(cell: str) -> float:
+    """Return a number, also one whose exponent is written as Fortran does: 1.5D+02."""
+    return float(_FORTRAN.sub("E", cell) if "d" in cell.lower() else cell)
+
+
+def _is_measured(cell: str) -> bool:
+    """Tell whether a cell holds a number and its unit, or percent."""
+    match = _MEASURED.fullmatch(cell)
+    return match is not None and (match["unit"] == "%" or unit_named(match["unit"]) is not None)
+
+
 def marks_within(cell: str) -> str:
-    """Say how to write a number that nobody can read for its marks; nothing where a cell is no such number."""
+    """Say how to write a number that nobody can read for what is in it; nothing where a cell is no such number."""
+    if _is_measured(cell):
+        return " without their unit, which belongs into the head, as in 'x [mm]'"
     if _THOUSANDS.fullmatch(cell):
         return " without marks between thousands"
     return " with a decimal point, without marks between thousands" if COMMA_NUMBER.fullmatch(cell) else ""
@@ -270,5 +286,8 @@ def _kind(cells: Sequence[str], comma: bool) -> str:
         return "date"
     if all(map(_NUMBER.fullmatch, filled)):
         return "number"
-    n_numbers = sum(is_number(cell, comma) or bool(marks_within(cell)) for cell in filled)
+    if all(map(_is_measured, filled)):
+        return "number"
+    # Numbers with marks that nobody can read are numbers too, so that they are refused.
+    n_numbers = sum(is_number(cell, True) or _THOUSANDS.fullmatch(cell) is not None for cell in filled)
     return "number" if 2 * n_numbers >= len(filled) else "text"

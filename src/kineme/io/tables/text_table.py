@@ -21,6 +21,7 @@ from kineme.io.tables.dialect import (
     COMMENTS,
     LONGEST,
     Dialect,
+    as_float,
     check_line,
     detect_dialect,
     is_missing,
@@ -442,6 +443,6 @@ def _number(cell: str, comma: bool) -> float | None:
     if "_" in cell:  # Python parses 1_000 as a number; tables do not write that
         return None
     try:
-        return float(cell.replace(",", ".") if comma else cell)
+        return as_float(cell.replace(",", ".") if comma else cell)
     except ValueError:
         return None
