@@ -1,6 +1,7 @@
 """Real recordings, written in every format, are read back to the last bit; each movement knows where it comes from."""
 
 import hashlib
+from pathlib import Path
 
 import lasa_files
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 
 import kineme
 from kineme.io.reading.formats import FORMATS
+from kineme.io.reading.read_file import parsed_file
 from kineme.io.reading.recordings import read_recording, read_recordings
 from kineme.io.writing.write_movement import write_movement
+from kineme.movements.tables.layout import Block, Detected, Layout, Parsed
 
 
 @pytest.mark.parametrize("source", lasa_files.SOURCES)
@@ -113,6 +116,15 @@ def test_garbage_under_any_name_is_a_problem_never_a_crash(tmp_path, ending, dat
     assert len(read) == 1
     with pytest.raises(kineme.errors.DataError, match=rf"bad\{ending}: \w+"):
         read_recording(tmp_path / f"bad{ending}")
+
+
+def test_a_label_that_no_reader_should_give_costs_its_file_alone(make_movement):
+    t, x = make_movement(1)
+    block = Block(x, t, np.array([0, len(t)]), [object()], [""])
+    detected = Detected("CSV", "wide", tuple("xyz"[: x.shape[1]]), "t", "s", "given")
+    read = parsed_file(lambda _: Parsed(detected, block), FORMATS[".csv"], Path("a.csv"), Layout())
+    assert [problem.file for problem in read.problems] == ["a.csv"]
+    assert not read.block.labels
 
 
 @pytest.mark.parametrize("source", ["npz_folder", "parquet_folder", "matlab_folder"])

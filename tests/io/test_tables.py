@@ -573,3 +573,38 @@ def test_spreadsheets_are_to_be_saved_as_text(tmp_path, ending):
     (tmp_path / f"a{ending}").write_bytes(b"PK")
     with pytest.raises(kineme.errors.DataError, match=rf"the spreadsheet a{ending}; save its sheet as \.csv"):
         read_recordings(tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("true", ["true", "True", "TRUE"])
+def test_true_and_false_are_one_and_zero(true, tmp_path):
+    """A gripper is a coordinate in text, Parquet and data frames; another word is a fault of its row."""
+    frame = pd.DataFrame({"t": np.arange(30) / 10, "x": np.arange(30.0) ** 2, "gripper": np.arange(30) // 9 % 2 > 0})
+    frame.to_parquet(tmp_path / "a.parquet")
+    for demos in (kineme.Demonstrations.of(frame), read_recordings(tmp_path / "a.parquet").demonstrations):
+        np.testing.assert_array_equal(demos.recorded[:, 1], frame.gripper)
+    rows = [f"{t},{x},{true if g else 'false'}" for t, x, g in frame.itertuples(index=False)]
+    demos = read("\n".join(["t,x,gripper", *rows])).demonstrations
+    np.testing.assert_array_equal(demos.recorded[:, 1], frame.gripper)
+    assert [channel.kind for channel in demos.channels] == ["position", "discrete"]
+    with pytest.raises(kineme.errors.DataError, match="line 31: expected true or false in 'gripper', got 'open'"):
+        read("\n".join(["t,x,gripper", *rows[:-1], "2.9,1,open"]))
+
+
+@pytest.mark.parametrize("unit", [" mm", "%", "deg"])
+def test_numbers_with_their_units_are_refused_unless_their_column_is_left_aside(unit):
+    """Half of the movement would be lost; a column of a label may hold them."""
+    rows = [(k / 10, f"{k}.5{unit}", k * k) for k in range(6)]
+    with pytest.raises(kineme.errors.DataError, match=f"expected numbers in 'x' without their unit.* got '0.5{unit}'"):
+        read(lines(rows))
+    assert read(lines(rows), exclude="x").demonstrations.dimensions == ("y",)
+    assert read(lines([(t, "0.5 mm", y) for t, _, y in rows], "t,label,y")).labels.tolist() == ["0.5 mm"]
+
+
+def test_texts_that_begin_with_a_number_without_a_unit_are_left_aside():
+    assert read(lines([(k / 10, f"{k} left", k * k) for k in range(6)])).demonstrations.dimensions == ("y",)
+
+
+@pytest.mark.parametrize("mark", ["D", "d"])
+def test_exponents_of_double_precision_are_read(mark):
+    rows = [(k / 10, f"{k * k + 0.5:.3e}".replace("e", mark), k) for k in range(6)]
+    np.testing.assert_array_equal(read(lines(rows)).demonstrations.positions[:, 0], [k * k + 0.5 for k in range(6)])

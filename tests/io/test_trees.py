@@ -67,7 +67,7 @@ def test_a_head_as_kineme_writes_it_is_that_of_times():
 def test_samples_may_carry_labels_movements_vectors_and_objects():
     long = [sample | {"demo": k // 5, "label": "wave"} for k, sample in enumerate(SAMPLES)]
     recordings = read_json(long)
-    assert where(recordings) == [("0.0", "wave"), ("1.0", "wave")]
+    assert where(recordings) == [("0", "wave"), ("1", "wave")]
     nested = [{"t": sample["t"], "q": [1, sample["x"]], "pose": {"position": {"x": sample["y"]}}} for sample in SAMPLES]
     assert read_json(nested).demonstrations.dimensions == ("q.0", "q.1", "pose.position.x")
     assert read_json(nested, columns="q").demonstrations.dimensions == ("q.0", "q.1")

@@ -258,6 +258,11 @@ def test_a_label_is_text(library, label, shown):
     assert len(library) == 0
 
 
+def test_a_number_is_the_same_label_with_and_without_a_fraction_of_zero(library):
+    library.learn(draw_movements(5), labels=[1, 1.0, np.float32(1.0), "1", 1.5])
+    assert {symbol.name for symbol in library.symbols()} == {"1", "1.5"}
+
+
 def test_nothing_of_the_caller_is_changed(library):
     x = draw_movements(3).positions.reshape(3, -1, 2).copy()
     x.setflags(write=False)

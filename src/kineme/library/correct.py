@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
 from kineme.library.storage.store import Store
 from kineme.movements.episodes import place_of
+from kineme.reporting.text import printable
 
 _ENDING = "-corrections.csv"
 _SAME = 1  # samples by which both ends of a stretch may differ from those annotated: files round times
@@ -101,6 +102,7 @@ def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: Lab
         first = f"; the first: {problems[0]}" if problems else ""
         raise DataError(f"expected corrections {corrected.name} of the recordings, got none{first}")
     before = stretches_of(recordings, annotated)[0] if annotated.rows else []
+    symbols = dict.fromkeys(row.label for row in annotated.rows if row.label is not None)
     changes: list[Change] = []
     unchanged = 0
     for recording in sorted({stretch.recording for stretch in after}):
@@ -112,6 +114,7 @@ def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: Lab
             near = old[best] if best >= 0 and shares[best] >= _MOVED else None
             if near is not None:
                 replaced.add(best)
+            new = _as_annotated(new, near, symbols)  # noqa: PLW2901
             ends = 0 if near is None else max(abs(near.start - new.start), abs(near.stop - new.stop))
             if near is not None and near.row.label == new.row.label and ends <= _SAME:
                 unchanged += 1
@@ -129,6 +132,19 @@ def _shared(a: Stretch, b: Stretch) -> float:
     """Return intersection over union."""
     both = min(a.stop, b.stop) - max(a.start, b.start)
     return max(both, 0) / (max(a.stop, b.stop) - min(a.start, b.start))
+
+
+def _as_annotated(new: Stretch, near: Stretch | None, symbols: Collection[str]) -> Stretch:
+    """Return a stretch with the symbol that was annotated, in whatever way its file writes that: first the near one."""
+    row, was = new.row, None if near is None else near.row.label
+    others = () if row.label is None or row.label in symbols else symbols
+    symbol = next((name for name in (was, *others) if name is not None and row.text in _written(name)), row.label)
+    return new._replace(row=row._replace(label=symbol))
+
+
+def _written(symbol: str) -> set[str]:
+    """Return how files have a symbol: without blanks around it, on one line as of ELAN, without tabs as of Audacity."""
+    return {symbol.strip(), printable(symbol).strip(), " ".join(printable(symbol).split()), " ".join(symbol.split())}
 
 
 def _kind(near: Stretch | None, new: Stretch) -> str | None:

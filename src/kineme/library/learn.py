@@ -28,6 +28,7 @@ from kineme.movements.channels.channel import in_words, is_plain, learned_names,
 from kineme.movements.channels.column_match import are_unknown, columns_recorded, may_be
 from kineme.movements.channels.coordinates import columns_of_kinds
 from kineme.movements.tables.layout import listed
+from kineme.movements.tables.table import as_name
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import in_coordinates
@@ -215,7 +216,7 @@ def as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
                 f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; "
                 f"name {named}, or pass None where it has no name"
             )
-    names = {name: None if name is None else check_name(str(name)) for name in dict.fromkeys(values)}
+    names = {name: None if name is None else check_name(as_name(name)) for name in dict.fromkeys(values)}
     return [names[name] for name in values]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas
@@ -16,6 +17,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.reading.read_labels import labeled_pieces, read_labels, seconds_of
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.annotations import Annotation, write_annotations
+from kineme.library.correct import as_labels, corrections_of
 
 SPANS = [(0.5, 1.75, "wave"), (2.0, 4.0, "nod")]
 #: As ELAN exports them: heads of a tier in a column of its own, heads with a tier for each row, and none.
@@ -239,3 +241,28 @@ def test_names_are_no_formulas_in_what_is_written_and_come_back(tmp_path, text):
     assert "0.5" in cells, "numbers stay numbers"
     (row,) = read_labels(path).rows
     assert (row.recording, row.place, row.label) == (f"{text}.csv", text, None if text == "-" else text)
+
+
+@pytest.mark.parametrize("name", ["out.csv", "out.json", "out.eaf", "out.txt"])
+@pytest.mark.parametrize("symbol", ["wave ", " lead", "none", "NaN", "unknown", "-", "a  b", "tab\there", "n\nx", "=1"])
+def test_what_nobody_changed_is_as_annotated_whatever_the_symbols_are_called(tmp_path, recordings, name, symbol):
+    """Another boundary is a change of that symbol, and what another symbol was is renamed."""
+    notes = [
+        Annotation("long.csv", "", 1000 + start, 1000 + end, label, 0.5, 0.5, 1000.0)
+        for (start, end, _), label in zip(SPANS, (symbol, None), strict=True)
+    ]
+    write_annotations(tmp_path / name, notes, [tmp_path / "long.csv"])
+    table = read_labels(tmp_path / name)
+    same = corrections_of(recordings, table, as_labels(notes))
+    assert (same.changes, same.unchanged) == ([], 2)
+    earlier = replace(notes[0], start=1000.25)
+    (change,) = corrections_of(recordings, table, as_labels([earlier, notes[1]])).changes
+    assert (change.kind, change.stretch.row.label) == ("moved", symbol)
+    other = replace(notes[0], symbol="other")
+    (change,) = corrections_of(recordings, table, as_labels([other, notes[1]])).changes
+    assert change.kind in {"renamed", "unnamed"}
+
+
+def test_a_symbol_that_is_known_may_have_a_name_that_elsewhere_says_nothing(tmp_path):
+    (tmp_path / "out.csv").write_text("start,end,symbol,unknown\n0,1,none,false\n1,2,none,true\n2,3,unknown,false\n")
+    assert [row.label for row in read_labels(tmp_path / "out.csv").rows] == ["none", None, None]

@@ -14,6 +14,7 @@ from kineme.errors import DataError
 from kineme.io.arrays.trees import SAY_STEP, STAMP, rate_of, seconds_named
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed
+from kineme.movements.tables.table import as_name
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import MIN_SAMPLES, ROUNDED, Array, too_long_integer
@@ -264,5 +265,4 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
 def _label(value: Any) -> str | None:
     if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected labels that are texts or numbers, got {value!r}")
-    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else "" if value is None else str(value)
-    return text or None
+    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else as_name(value)) or None

@@ -12,7 +12,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import ROWS, Named, parsed_arrays
 from kineme.io.limits import check_expanded
-from kineme.io.tables.dialect import is_number, is_skipped, separator_of, split
+from kineme.io.tables.dialect import as_float, is_number, is_skipped, separator_of, split
 from kineme.io.tables.text_table import lines_of
 from kineme.movements.tables.columns import LABEL_WORDS, column_numbers
 from kineme.movements.tables.layout import Layout, Parsed, listed
@@ -55,7 +55,7 @@ def row_movements(data: bytes, layout: Layout) -> Parsed:
         cells = list(given)
         text = cells.pop(label) if label is not None and label < len(cells) else None
         try:
-            values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
+            values = np.array([as_float(cell or "nan") for cell in cells], dtype=np.float64)
         except ValueError:
             odd = next(cell for cell in cells if not is_number(cell or "nan", False))
             raise ValueError(f"expected numbers, got {odd!r:.40}") from None

@@ -25,7 +25,8 @@ from kineme.movements.tables.layout import Block, Detected, Known, Layout, Parse
 
 #: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (
-    KinemeError, ValueError, KeyError, TypeError, EOFError, OSError, ArithmeticError, RecursionError, MemoryError
+    KinemeError, ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, ArithmeticError, RecursionError,
+    MemoryError
 )  # fmt: skip
 
 _SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods", ".numbers"})
@@ -109,12 +110,12 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             block, sentinels = sentinels_as_missing(block, detected.columns)
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
+        folder, stem = as_text(relative.parent.name), as_text(relative.stem)
+        label = stem if form.label_is_stem and not (folder and stem.isdecimal()) else folder or None
+        labels = [label if own is None or (folder and named_alone) else _storable(own) for own in block.labels]
+        people = block.people and [None if person is None else _storable(person) for person in block.people]
     except _UNREADABLE as error:
         return FileRead(name, []).without_movements(_plainly(error))
-    folder, stem = as_text(relative.parent.name), as_text(relative.stem)
-    label = stem if form.label_is_stem and not (folder and stem.isdecimal()) else folder or None
-    labels = [label if own is None or (folder and named_alone) else _storable(own) for own in block.labels]
-    people = block.people and [None if person is None else _storable(person) for person in block.people]
     bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
     block = replace(bare, people=people, repairs=block.repairs)
     problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]

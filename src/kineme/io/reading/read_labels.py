@@ -41,7 +41,8 @@ _LABELS = frozenset(
 )  # fmt: skip
 _RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
 _CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
-_NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels that say that there is none
+_ERASED = frozenset({"", "-", "?", UNKNOWN})  # what people write over a label
+_NOTHING = _ERASED | {"none", "nan", "null"}  # labels that say that there is none
 
 
 class LabelRow(NamedTuple):
@@ -54,6 +55,7 @@ class LabelRow(NamedTuple):
     recording: str
     place: str
     line: int  # row of the table, from 1
+    text: str = ""  # what stands for the label in the table
 
 
 class Heads(NamedTuple):
@@ -66,6 +68,7 @@ class Heads(NamedTuple):
     place: int | None
     units: tuple[str, str]
     of_elan: bool
+    unknown: int | None = None
 
 
 def heads_of(cells: Sequence[str]) -> Heads | None:
@@ -88,11 +91,12 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     labels = labeled or [k for k in others if names[k] and names[k] not in aside]
     if len(labels) != 1 and not labeled:
         raise DataError(f"expected one column of labels beside start and end, got {list(cells)}; call it label")
-    recording, place = (
-        next((k for k, name in enumerate(names) if name in wanted), None) for wanted in (_RECORDINGS, _PLACES)
+    recording, place, unknown = (
+        next((k for k, name in enumerate(names) if name in wanted), None)
+        for wanted in (_RECORDINGS, _PLACES, {UNKNOWN})
     )
     units = _unit_of(names[start]), _unit_of(names[end])
-    return Heads(start, end, labels[0], recording, place, units, "time - " in names[start])
+    return Heads(start, end, labels[0], recording, place, units, "time - " in names[start], unknown)
 
 
 def _is_time(name: str) -> bool:
@@ -134,8 +138,11 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     recording, place = (
         "" if k is None or k >= len(cells) else text_in(cells[k].strip()) for k in (heads.recording, heads.place)
     )
-    label = text_in(cells[heads.label].strip())
-    return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
+    text = text_in(cells[heads.label].strip())
+    # Where kineme wrote that the motion is known, symbols may have names that say elsewhere that there is none.
+    is_known = heads.unknown is not None and cells[heads.unknown : heads.unknown + 1] in (["false"], ["False"])
+    nothing = _ERASED if is_known else _NOTHING
+    return LabelRow(start, end, None if text.lower() in nothing else text, recording, place, line, text)
 
 
 def seconds_of(cell: str) -> float | None:

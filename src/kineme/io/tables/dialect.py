@@ -10,6 +10,7 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.table import flags_in
 from kineme.movements.tables.time_stamps import is_date
 from kineme.reporting.text import text_in
 from kineme.units import unit_named
@@ -23,7 +24,10 @@ _HEAD = 100_000  # lines among which they are
 _MOST_HEADS = 5  # lines of heads, at most
 _WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
 _CELL = 32  # memory of a cell in Python, per character [bytes]
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_DIGITS = r"[-+]?(\d+\.?\d*|\.\d+)(([eE][-+]?|[dD][-+])\d+)?"
+_NUMBER = re.compile(rf"{_DIGITS}|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_MEASURED = re.compile(rf"{_DIGITS}\s*(?P<unit>[^\s\d.,].*)")  # a number with its unit beside it: 12.3 mm
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d)")  # before an exponent, of double precision
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 _SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
@@ -47,6 +51,7 @@ class Dialect(NamedTuple):
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
     measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
     end: int | None = None  # line after the last sample; None: the end of the file
+    flags: tuple[int, ...] = ()  # columns of numbers that are written as true and false
     names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
@@ -60,8 +65,8 @@ class Dialect(NamedTuple):
             return False
         return len(cells) == len(self.kinds) and all(
             is_number(cell, self.decimal_comma)
-            for cell, kind in zip(cells[1:], self.kinds[1:], strict=True)
-            if kind == "number"
+            for k, (cell, kind) in enumerate(zip(cells, self.kinds, strict=True))
+            if k and kind == "number" and k not in self.flags
         )
 
 
@@ -147,9 +152,17 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
                 f"expected times such as 2024-05-06T07:08:09.25 or 07:08:09.25 in {where}, got {cell!r:.80}; write "
                 f"them so{'' if heads else ', or name the columns in a first line'}"
             )
+    # The first column without a head is of times, which no flag is.
+    flags = tuple(
+        k
+        for k in range(0 if heads else 1, len(kinds))
+        if flags_in([row[k] for row in body if k < len(row) and not is_missing(row[k])]) is not None
+    )
+    kinds = tuple("number" if k in flags else kind for k, kind in enumerate(kinds))
     if heads:
-        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
-    return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units, flags=flags)
+    names = tuple(f"column {k}" for k in range(len(kinds)))
+    return Dialect(separator, comma, names, False, first, kinds, flags=flags)
 
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
@@ -232,8 +245,21 @@ def is_number(cell: str, comma: bool) -> bool:
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
 
 
+def as_float(cell: str) -> float:
+    """Return a number, also one whose exponent is written as Fortran does: 1.5D+02."""
+    return float(_FORTRAN.sub("E", cell) if "d" in cell.lower() else cell)
+
+
+def _is_measured(cell: str) -> bool:
+    """Tell whether a cell holds a number and its unit, or percent."""
+    match = _MEASURED.fullmatch(cell)
+    return match is not None and (match["unit"] == "%" or unit_named(match["unit"]) is not None)
+
+
 def marks_within(cell: str) -> str:
-    """Say how to write a number that nobody can read for its marks; nothing where a cell is no such number."""
+    """Say how to write a number that nobody can read for what is in it; nothing where a cell is no such number."""
+    if _is_measured(cell):
+        return " without their unit, which belongs into the head, as in 'x [mm]'"
     if _THOUSANDS.fullmatch(cell):
         return " without marks between thousands"
     return " with a decimal point, without marks between thousands" if COMMA_NUMBER.fullmatch(cell) else ""
@@ -260,5 +286,8 @@ def _kind(cells: Sequence[str], comma: bool) -> str:
         return "date"
     if all(map(_NUMBER.fullmatch, filled)):
         return "number"
-    n_numbers = sum(is_number(cell, comma) or bool(marks_within(cell)) for cell in filled)
+    if all(map(_is_measured, filled)):
+        return "number"
+    # Numbers with marks that nobody can read are numbers too, so that they are refused.
+    n_numbers = sum(is_number(cell, True) or _THOUSANDS.fullmatch(cell) is not None for cell in filled)
     return "number" if 2 * n_numbers >= len(filled) else "text"

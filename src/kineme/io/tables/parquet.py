@@ -20,7 +20,7 @@ from kineme.io.records import damaged_as
 from kineme.movements.episodes import STATE
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout, no_lines
-from kineme.movements.tables.table import Table
+from kineme.movements.tables.table import Table, as_name
 from kineme.movements.tables.time_stamps import nanoseconds
 from kineme.validation import ROUNDED, Array, too_long_integer
 
@@ -173,7 +173,7 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     if STATE in lists:
         return {STATE}
     try:
-        kinds = [_kind(kind) for kind in types]
+        kinds = ["text" if pa.types.is_boolean(kind) else _kind(kind) for kind in types]  # flags are beside positions
         choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)
     except DataError:
         if len(lists) > 1:
@@ -215,7 +215,8 @@ def _kind(kind: Any) -> str:
     of = pa.types
     if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
         return "date"
-    return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
+    is_number = of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) or of.is_boolean(kind)
+    return "number" if is_number else "text"
 
 
 def _texts(column: Any, head: str) -> Any:
@@ -236,11 +237,11 @@ def _text(value: Any, head: str) -> str:
         return value.decode("utf-8", "replace")
     if value != value:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected names in {head!r}, got {value!r}")
-    return "" if value is None else str(value)
+    return as_name(value)
 
 
 def _numbers(column: Any, head: str) -> Any:
-    values = column.to_numpy()
+    values = (column.cast(pa.uint8()) if pa.types.is_boolean(column.type) else column).to_numpy()
     if values.dtype.kind in "Mm":
         return nanoseconds(values)
     try:

@@ -21,6 +21,7 @@ from kineme.io.tables.dialect import (
     COMMENTS,
     LONGEST,
     Dialect,
+    as_float,
     check_line,
     detect_dialect,
     is_missing,
@@ -29,7 +30,7 @@ from kineme.io.tables.dialect import (
 )
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.table import Table
+from kineme.movements.tables.table import FLAGS, Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
 from kineme.validation import MIN_SAMPLES, ROUNDED, Array
 
@@ -66,6 +67,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
+    texts |= {*dialect.flags}
     if 0 in {roles.label, *roles.movement}:
         dialect = dialect._replace(names_rows=True)
     rows, faults = _rows(data, encoding, dialect, texts)
@@ -81,6 +83,11 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
                 f"lines that are left out; {remedy}, or remove those lines"
             )
     columns = [rows[name] for name in rows.dtype.names or ()]
+    for k in {*roles.positions} & {*dialect.flags}:
+        cells = ["" if is_missing(cell) else cell.lower() for cell in columns[k].tolist()]
+        columns[k] = np.array([FLAGS.get(cell, np.nan) for cell in cells])
+        said = f"expected true or false in {dialect.heads[k]!r}"
+        faults |= {row: f"{said}, got {cell!r}" for row, cell in enumerate(cells) if cell not in FLAGS}
     if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
         faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
     if unread := [k for k in roles.positions if np.isnan(columns[k]).all()]:
@@ -436,6 +443,6 @@ def _number(cell: str, comma: bool) -> float | None:
     if "_" in cell:  # Python parses 1_000 as a number; tables do not write that
         return None
     try:
-        return float(cell.replace(",", ".") if comma else cell)
+        return as_float(cell.replace(",", ".") if comma else cell)
     except ValueError:
         return None

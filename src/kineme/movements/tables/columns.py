@@ -72,8 +72,8 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         kinds = ["text" if k in excluded else kind for k, kind in enumerate(kinds)]
     label = _label(heads, kinds, layout, named)
     movement = _movement(heads, layout, named, label)
-    taken = {*movement, label}
     person = None if layout.person is None else _number(heads, layout.person)
+    taken = {*movement, label, person}
     movement = movement if person is None or person in movement else (*movement, person)
     time, *others = _times(heads, kinds, layout, named, taken)
     beside = _nanoseconds(heads, kinds) if named else {}
@@ -99,6 +99,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
             k
             for k in free
             if not (named and (k in clocks or heads[k] in derived or _says_nothing_new(heads[k], plain)))
+            and not _is_left_over(heads[k], layout)
         )
     if not positions:
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
@@ -294,6 +295,13 @@ def _label(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bo
     return of_labels[0] if of_labels else None
 
 
+def _is_left_over(head: str, layout: Layout) -> bool:
+    """Tell whether a head names movements or labels, for which the caller has chosen another column."""
+    return (layout.keys is not None and _named_as(head, MOVEMENT_WORDS)) or (
+        layout.label is not None and _named_as(head, LABEL_WORDS - {"action"})  # the actions of a robot are numbers
+    )
+
+
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
     if layout.keys is not None:
         return column_numbers(heads, layout.keys)
@@ -364,6 +372,7 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
         or not head.strip()
         or _ROS_HEADER.fullmatch(head)
         or _UNNAMED.fullmatch(head)
+        or head == "next.done"  # the end of an episode of LeRobot
     ):
         return True
     if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states

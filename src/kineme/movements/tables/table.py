@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 from itertools import pairwise
@@ -28,8 +29,12 @@ from kineme.movements.tables.time_stamps import (
 )
 from kineme.validation import ROUNDED, Array, too_long_integer
 
-_KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
+# Of NumPy -> of `choose_roles`.
+_KINDS = {"b": "number", "i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
 _NUMBERS = (Real, Decimal)
+#: Cell in lower case -> number.
+FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
+_WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
 class Segments(NamedTuple):
@@ -64,6 +69,9 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     new movement begins where they change or the time decreases. Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
+    names = {*roles.movement, roles.label}
+    columns = [_names(column) if k in names else column for k, column in enumerate(table.columns)]
+    table = replace(table, columns=columns)
     times, units, units_from = _times(table, roles, layout)
     # Refuse several columns of times that do not show the same clock.
     for k in roles.clocks:
@@ -76,8 +84,8 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     n = len(keys)
     people: list[str | None] | None = None
     if roles.person is not None:  # who showed the first sample of each movement
-        names = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
-        people = [str(name) or None for name in names.tolist()]
+        shown = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
+        people = [name or None for name in shown.tolist()]
     rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
     if rows is not None:
         positions, times, codes = positions[rows], times[rows], codes[rows]
@@ -257,7 +265,8 @@ def _values(series: Any) -> NDArray[Any]:
 def _kind(values: NDArray[Any]) -> str:
     """Find the kind of a column; one with a number among texts has numbers, and is refused where it is a coordinate."""
     mixed = values.dtype.kind == "O" and (any(map(_is_number, values.tolist())) or _are_decimals(values.tolist()))
-    return "number" if mixed or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
+    are_flags = values.dtype.kind == "O" and flags_in(values.tolist()) is not None
+    return "number" if mixed or are_flags or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
 
 
 def _are_decimals(texts: list[str]) -> bool:
@@ -279,12 +288,41 @@ def _texts(values: list[Any]) -> NDArray[Any]:
     return texts
 
 
+def as_name(value: Any) -> str:
+    """The text that names a movement, a label or a person; of a whole number without a fraction, empty for none."""
+    if _is_missing(value):
+        return ""
+    is_fraction = isinstance(value, (float, np.floating, Decimal)) and isfinite(value)
+    return str(int(value)) if is_fraction and value == int(value) else str(value)
+
+
+def _names(values: NDArray[Any]) -> NDArray[Any]:
+    """The names in a column; texts lose the fraction of whole numbers if all are such: "1.0" and "2.0", not "1.5"."""
+    several = values.tolist()
+    texts = {value: as_name(value) for value in {*several}}
+    if all(map(_WHOLE.fullmatch, filter(None, texts.values()))):
+        texts = {value: text.partition(".")[0] for value, text in texts.items()}
+    names = np.empty(len(several), dtype=object)
+    names[:] = [texts[value] for value in several]
+    return names
+
+
 def _is_missing(value: Any) -> bool:
     is_nan = isinstance(value, float) and value != value  # noqa: PLR0124
     return value is None or type(value).__name__ in ("NAType", "NaTType") or is_nan
 
 
+def flags_in(cells: Sequence[Any]) -> NDArray[np.float64] | None:
+    """Numbers for true and false in any case, NaN for empty cells; None if there are other cells, or none of these."""
+    values = {cell: FLAGS.get(str(cell).lower()) for cell in {*cells}}
+    if None in values.values() or not any(map(str, values)):
+        return None
+    return np.array([values[cell] for cell in cells], dtype=np.float64)
+
+
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
+    if values.dtype.kind == "O" and (flags := flags_in(values.tolist())) is not None:
+        return flags
     if _KINDS.get(values.dtype.kind) != "number":
         i, got = next(((i, value) for i, value in enumerate(values.tolist()) if not _is_number(value)), (0, values[0]))
         raise DataError(
