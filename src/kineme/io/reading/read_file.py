@@ -111,7 +111,8 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
         folder, stem = as_text(relative.parent.name), as_text(relative.stem)
-        label = stem if form.label_is_stem and not (folder and stem.isdecimal()) else folder or None
+        counts = bool(folder) and stem.isdecimal() and len(block.labels) == 1  # the recordings of a label
+        label = stem if form.label_is_stem and not counts else folder or None
         labels = [label if own is None or (folder and named_alone) else _storable(own) for own in block.labels]
         people = block.people and [None if person is None else _storable(person) for person in block.people]
     except _UNREADABLE as error:
