@@ -63,6 +63,12 @@ def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
         assert one["prototype"] in members
 
 
+def test_movements_of_two_proposals_with_one_name_are_added_up(folder, tmp_path):
+    (tmp_path / "names.json").write_text('{"1": "wave", "2": "wave"}')
+    options = ("--accept", "1,2", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p")
+    assert answer("anchor", "-l", folder, *options)["accepted"] == {"wave": 14}
+
+
 def test_what_is_rejected_is_not_proposed_again(folder, tmp_path):
     first = answer("anchor", "-l", folder, "--reject", "2", "--pictures", tmp_path / "p")
     gone = first["proposals"][1]["movements"]
@@ -98,12 +104,14 @@ def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
         (["--accept", "2,1", "--reject", "1"], 2, "expected each proposal accepted or rejected, got both for 1"),
         (["--accept", "all", "--names", "worse.json"], 1, "expected a name without the character U+0000"),
         (["--accept", "all", "--names", "old.json"], 1, "proposals are counted from 1, got 0"),
+        (["--accept", "1", "--names", "more.json"], 2, "there are 4 proposals, counted from 1, got 9"),
         (["--accept", "1", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
         (["--clusters", "3", "--method", "hdbscan"], 1, "expected no n_clusters with method='hdbscan'"),
     ],
 )
 def test_wrong_choices_change_nothing(folder, tmp_path, arguments, status, message):
     (tmp_path / "bad.json").write_text("[1, 2]")
+    (tmp_path / "more.json").write_text('{"1": "wave", "9": "ghost"}')
     (tmp_path / "old.json").write_text('{"0": "wave", "1": "nod"}')
     (tmp_path / "worse.json").write_text('{"0": "wave", "1": "a\\u0000"}')
     done = run("anchor", "-l", folder, *arguments, cwd=tmp_path)

@@ -193,6 +193,28 @@ def test_one_undo_takes_back_what_was_learned_and_what_moved(annotated, tmp_path
     assert "take it back" not in said
 
 
+def test_an_example_that_a_mended_slip_left_is_named(annotated, tmp_path):
+    source, library, rows = annotated
+    rows = [row for row in rows if row["place"] == "episode 1"]
+    arguments = ("correct", source, "--before", tmp_path / "set.csv", "-l", library, "--labels")
+    slip = [dict(row) for row in rows]
+    slip[0]["symbol"] = "swing"
+    assert answer(*arguments, _write(tmp_path / "slip.csv", slip))["contradicted"] == []
+    mended = (*arguments, _write(tmp_path / "mended.csv", rows))
+    (left,) = answer(*mended)["contradicted"]
+    with kineme.ActionLibrary(library, read_only=True) as actions:
+        assert [left["movement"]] == actions["swing"].members.tolist()
+    assert (left["symbol"], left["now"] or "") == ("swing", rows[0]["symbol"])
+    assert left["start"] == pytest.approx(float(rows[0]["start"]), abs=0.01)
+    assert "remove what is wrong: kineme library delete --movement ID" in run(*mended).stdout
+    rows[0]["end"] = str(float(rows[0]["end"]) - 0.2)
+    rows[0]["symbol"] = "swing"
+    _write(tmp_path / "mended.csv", rows)  # the same symbol, with other ends
+    assert [one["now"] for one in answer(*mended)["contradicted"]] == ["swing"]
+    run("library", "delete", "--movement", left["movement"], "--yes", "-l", library)
+    assert answer(*mended)["contradicted"] == []
+
+
 def test_a_named_data_set_says_itself_what_was_annotated(annotated, tmp_path):
     source, library, rows = annotated
     run("annotate", source, "-l", library, "-o", tmp_path / "named")

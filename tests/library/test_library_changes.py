@@ -191,6 +191,14 @@ def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
     assert library.verify() == []
 
 
+def test_what_a_symbol_has_already_is_no_change(library):
+    library.annotate("wave", "with the hand", prototype=1)
+    version = library.version
+    library.annotate("wave")
+    library.annotate("wave", "with the hand", prototype=1)
+    assert library.version == version
+
+
 @pytest.mark.parametrize("leave", [lambda it: it.assign([1, 2], "nod"), lambda it: it.release([1, 2])])
 def test_a_prototype_that_shows_another_symbol_does_not_stand_for_the_first(library, leave):
     for name in ("wave", "nod", "bow"):
@@ -259,6 +267,7 @@ def test_history_says_what_was_done(library):
         (lambda it: it.delete([]), r"expected ids of movements, whole numbers, at least one, got \[\]"),
         (lambda it: it.delete([1.5]), r"expected ids of movements, whole numbers, at least one, got \[1.5\]"),
         (lambda it: it.annotate("wave", prototype=99), r"movements in the library, got 99"),
+        (lambda it: it.annotate("wave", prototype=2), r"expected a movement of 'wave' as its prototype, got 2, which"),
         (lambda it: it.annotate("wave", threshold=np.nan), r"expected threshold to be a number, got nan"),
         (lambda it: it.annotate("wave", name=""), r"expected what is annotated to be one of .* got 'name'"),
         (lambda it: it.rename("wave", it["nod"].id), r"expected a name, got 'sym-\w+', which is the id of a symbol"),

@@ -67,6 +67,8 @@ def anchor(folder: Any, **options: Any) -> None:
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
+    import numpy as np
+
     from kineme.library.proposals import Recognized, assign_recognized, propose, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
@@ -84,6 +86,7 @@ def anchor(folder: Any, **options: Any) -> None:
         rejected = _chosen(proposals, options["reject"], "--reject")
         if both := set(accepted) & set(rejected):
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
+        _chosen(proposals, [*names], "--names")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
             "joined": assign_recognized(library.store, joining) if writes else {},
@@ -105,8 +108,9 @@ def anchor(folder: Any, **options: Any) -> None:
             taken = {symbol.name for symbol in library.symbols()}
             free = (f"cluster {k}" for k in range(number, number + len(taken) + 1) if f"cluster {k}" not in taken)
             name = names.get(number) or proposals[number - 1].name or next(free)
+            without = np.intersect1d(proposals[number - 1].members, library.unlabeled())
             library.accept(proposals[number - 1], name)
-            data["accepted"][name] = len(proposals[number - 1])
+            data["accepted"][name] = data["accepted"].get(name, 0) + len(without)
         for number in rejected:
             library.reject(proposals[number - 1])
         data["rejected"] = rejected

@@ -42,7 +42,7 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     """
     from kineme.io.reading.formats import root_of
     from kineme.io.reading.read_labels import read_labels
-    from kineme.library.correct import corrections_of, learn_corrections
+    from kineme.library.correct import contradicted, corrections_of, learn_corrections
 
     as_json, dry_run, error_rate = (options.pop(name) for name in ("as_json", "dry_run", "error_rate"))
     corrected, annotated = options.pop("corrected"), options.pop("annotated")
@@ -71,6 +71,14 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "moved": report.moved,
             "duplicates": report.duplicates,
             "symbols": sorted({str(change.stretch.row.label) for change in learned} - symbols),
+            "contradicted": [
+                {
+                    "movement": one.movement, "recording": parsed.sources[one.stretch.recording].path,
+                    "place": parsed.sources[one.stretch.recording].place, "start": one.start, "end": one.end,
+                    "symbol": one.symbol, "now": one.stretch.row.label,
+                }
+                for one in contradicted(library.store, parsed, corrections)
+            ],
             "version": library.version,
             "dry_run": dry_run,
             "problems": [str(problem) for problem in (*parsed.problems, *corrections.problems)],
@@ -141,5 +149,13 @@ def _text(data: dict[str, Any], undo: str, problems: list[str]) -> str:
             for change in changes[:_SHOWN]
         ]  # fmt: skip
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
-    lines += [*problems[:_SHOWN], *unlisted({"changes": changes, "problems": problems}, _SHOWN)]
+    others = [
+        (str(one["movement"]), *stretch_cells(one), printable(one["symbol"]), printable(one["now"] or "unknown"))
+        for one in data["contradicted"]
+    ]
+    if others:
+        title = "learned before, and not as it is now; remove what is wrong: kineme library delete --movement ID"
+        lines.append(table(("ID", "recording", "start [s]", "end [s]", "symbol", "now"), others[:_SHOWN], title))
+    lines += problems[:_SHOWN]
+    lines += unlisted({"changes": changes, "examples": others, "problems": problems}, _SHOWN)
     return "\n".join([*lines, undo] if undo else lines)

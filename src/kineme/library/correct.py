@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from kineme.io.writing.annotations import Annotation
 from kineme.library.learn import learn_recordings, stored_ids
 from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
+from kineme.library.storage.rows import among, listed, select
 from kineme.library.storage.store import Store
 from kineme.movements.episodes import place_of
 from kineme.reporting.text import printable
@@ -34,6 +36,8 @@ CHANGES = {
     "removed": "annotated, and not there any more",
     "unnamed": "a symbol that became unknown",
 }
+_STRETCH = re.compile(r"(?:(.*) )?(-?[\d.]+)-(-?[\d.]+) s", re.DOTALL)  # place of a movement that was cut
+_HALF = 0.5  # intersection over union from which an example shows the same stretch as a row
 _LEARNED = ("named", "renamed", "moved", "added")
 
 
@@ -56,6 +60,7 @@ class Corrections(NamedTuple):
     changes: list[Change]  # in the order of recordings and time
     unchanged: int  # stretches that are as annotated
     problems: list[Problem]  # rows that are no stretch of the recordings
+    stretches: list[Stretch]  # all that the person left
 
     @property
     def examples(self) -> list[Stretch]:
@@ -125,7 +130,7 @@ def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: Lab
             for k, stretch in enumerate(old)
             if k not in replaced and stretch.row.label is not None
         ]
-    return Corrections(changes, unchanged, problems)
+    return Corrections(changes, unchanged, problems, after)
 
 
 def _shared(a: Stretch, b: Stretch) -> float:
@@ -195,3 +200,43 @@ def learn_corrections(
     for symbol, keys in ({} if dry_run else moving).items():
         version = storage.assign(store, sorted(keys), symbol, "label", continues=version if version > before else None)
     return Learned(added, sum(map(len, moving.values())), len(examples) - added)
+
+
+class Contradicted(NamedTuple):
+    """An example in the library that shows another symbol than a person left, or has other ends."""
+
+    movement: int  # its id
+    symbol: str
+    start: float  # [s], and so is the end
+    end: float
+    stretch: Stretch  # as the person left it
+
+
+def contradicted(store: Store, recordings: Recordings, corrections: Corrections) -> list[Contradicted]:
+    """Return the examples of the same recordings that a stretch contradicts: learned before a slip was mended."""
+    hashes = {recordings.sources[stretch.recording].sha256 for stretch in corrections.stretches}
+    with store.reading() as connection:
+        files = {row[0]: row[2] for row in select(connection, "source", among("sha256"), {"keys": listed(hashes)})}
+        where = f"removed IS NULL AND {among('source')}"
+        rows = select(connection, "movement", where, {"keys": listed(files)})
+    names = names_of(store, np.array([row[0] for row in rows], dtype=np.int64))
+    examples: dict[tuple[str, str], list[tuple[int, str, float, float]]] = {}
+    for (key, source, place, *_), name in zip(rows, names, strict=True):
+        if name is not None and (cut := _STRETCH.fullmatch(place or "")):
+            examples.setdefault((files[source], cut[1] or ""), []).append((key, name, float(cut[2]), float(cut[3])))
+    learned = {*corrections.examples}
+    found: list[Contradicted] = []
+    for recording in sorted({stretch.recording for stretch in corrections.stretches}):
+        source, offsets = recordings.sources[recording], recordings.demonstrations.offsets
+        times = recordings.demonstrations.times[offsets[recording] : offsets[recording + 1]]
+        own = [stretch for stretch in corrections.stretches if stretch.recording == recording]
+        for key, name, start, end in examples.get((source.sha256, source.place), ()):
+            # Places round times: the nearest sample is meant.
+            first, last = (int(np.abs(times - time).argmin()) for time in (start, end))
+            example = Stretch(recording, first, last + 1, own[0].row)
+            now = max(own, key=lambda stretch: _shared(stretch, example))
+            ends = max(abs(now.start - first), abs(now.stop - last - 1))
+            joins = now in learned and ends == 0  # in a dry run it has not yet
+            if _shared(now, example) > _HALF and not joins and (name != now.row.label or ends > _SAME):
+                found.append(Contradicted(key, name, start, end, now))
+    return found

@@ -454,7 +454,7 @@ class ActionLibrary:
         changes.rename(self.store, old, new)
 
     def annotate(self, who: str, text: str | None = None, **values: Any) -> None:
-        """Set the description of a symbol, its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
+        """Set the description of a symbol, its ``prototype`` (id of a member) or ``threshold``; None clears these."""
         changes.annotate(self.store, who, **({} if text is None else {"description": text}), **values)
 
     def delete(self, what: str | ArrayLike) -> None:

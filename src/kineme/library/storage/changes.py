@@ -33,7 +33,8 @@ def rename(store: Store, old: str, new: str) -> int:
 
 @repeated
 def annotate(store: Store, who: str, **values: Any) -> int:
-    """Change description, prototype (id of a movement) and threshold of a symbol."""
+    """Change description, prototype (id of a member) and threshold of a symbol; what it has already is no version."""
+    store.check_writable()
     for name in values:
         check_choice("what is annotated", name, _SAID)
     if (prototype := values.get("prototype")) is not None:
@@ -43,8 +44,14 @@ def annotate(store: Store, who: str, **values: Any) -> int:
         values["threshold"] = float(threshold)
     if "description" in values:
         _check_description(values["description"])
+    with store.reading() as connection:
+        state = state_of(connection, who, NOW)
+        if all(state[_STATE.index(name)] == value for name, value in values.items()):
+            return store.moment(connection).version
     with store.writing("annotate") as change:
         state = state_of(change.connection, who, NOW)
+        if prototype is not None:
+            _check_member(change.connection, state, values["prototype"])
         change.detail.update(symbol=state[_NAME], **values)
         _replace_state(change, state, **values)
     return change.version
@@ -196,6 +203,15 @@ def _forget_prototypes(change: Change, left: Sequence[Row]) -> None:
     for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('symbol')}", keys):
         if (state[1], state[4]) in pairs:
             _replace_state(change, state, prototype=None)
+
+
+def _check_member(connection: Database, state: Row, movement: int) -> None:
+    where = "removed IS NULL AND symbol = :key AND movement = :movement"
+    if not select(connection, "member", where, {"key": state[1], "movement": movement}):
+        raise SpecificationError(
+            f"expected a movement of {state[_NAME]!r} as its prototype, got {movement}, which is not one of them; "
+            "choose a member, or assign it first"
+        )
 
 
 def _move_members(change: Change, members: Sequence[Row], key: int) -> None:
