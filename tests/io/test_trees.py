@@ -64,6 +64,16 @@ def test_a_head_as_kineme_writes_it_is_that_of_times():
         assert recordings.detected[0][0].time == "time [s]"
 
 
+def test_a_frame_without_its_index_and_lines_that_end_in_json_are_tables():
+    split = {"columns": ["t", "x", "y"], "data": np.column_stack((T, X)).tolist()}
+    for data in (json.dumps(split), "\n".join(map(json.dumps, SAMPLES))):
+        recordings = read(data, "a.json")
+        np.testing.assert_array_equal(recordings.demonstrations.times, T)
+        np.testing.assert_array_equal(recordings.demonstrations.positions, X)
+    with pytest.raises(DataError, match="truncated or damaged"):
+        read(json.dumps(SAMPLES, indent=1) + "\n]", "a.json")
+
+
 def test_samples_may_carry_labels_movements_vectors_and_objects():
     long = [sample | {"demo": k // 5, "label": "wave"} for k, sample in enumerate(SAMPLES)]
     recordings = read_json(long)

@@ -40,6 +40,9 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
     try:
         entries = json.loads(data, object_pairs_hook=_each_once)
     except json.JSONDecodeError as error:
+        first = error.doc[: error.pos].strip()
+        if error.msg == "Extra data" and error.colno == 1 and "\n" not in first:  # JSON lines of that ending
+            return json_lines_movements(data, layout)
         raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
     if isinstance(entries, Mapping):
         if (frame := _frame(entries)) is not None:
@@ -69,12 +72,13 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
 
 def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
     """Give the columns, and the index as one, of a data frame as pandas writes it; None of something else."""
-    if {*entries} == {"columns", "index", "data"}:
+    if {*entries} == {"columns", "index", "data"} or _is_split(entries):
         if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
             raise DataError("expected a row of data with a number for each of the columns, got another one")
         heads = ["_".join(map(str, head)) if isinstance(head, list) else str(head) for head in entries["columns"]]
         columns = map(list, zip(*entries["data"], strict=True))
-        return _with_index(entries["index"], dict(zip(heads, columns, strict=True)))
+        named = dict(zip(heads, columns, strict=True))
+        return _with_index(entries["index"], named) if "index" in entries else named
     rows = list(entries.values())
     if not rows or not all(isinstance(row, Mapping) and row and row.keys() == rows[0].keys() for row in rows):
         return None
@@ -85,6 +89,15 @@ def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
     if _counts(entries):
         return _with_index(list(entries), {head: [row[head] for row in rows] for head in rows[0]})
     return None
+
+
+def _is_split(entries: Mapping[str, Any]) -> bool:
+    """Tell whether these are the heads and the rows of a frame without its index."""
+    if {*entries} != {"columns", "data"} or not all(isinstance(entry, list) for entry in entries.values()):
+        return False
+    rows, width = entries["data"], len(entries["columns"])
+    are_rows = all(isinstance(row, list) and len(row) == width for row in rows)
+    return are_rows and not any(isinstance(cell, (Mapping, list)) for row in rows for cell in row)
 
 
 def _counts(names: Iterable[str]) -> bool:
