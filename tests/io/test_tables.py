@@ -577,8 +577,15 @@ def test_spreadsheets_are_to_be_saved_as_text(tmp_path, ending):
 
 @pytest.mark.parametrize("true", ["true", "True", "TRUE"])
 def test_true_and_false_are_one_and_zero(true, tmp_path):
-    """A gripper is a coordinate in text, Parquet and data frames; another word is a fault of its row."""
+    """A gripper is a channel in text, Parquet and data frames, another flag is none; a word is a fault of its row."""
     frame = pd.DataFrame({"t": np.arange(30) / 10, "x": np.arange(30.0) ** 2, "gripper": np.arange(30) // 9 % 2 > 0})
+    beside = frame.assign(valid=frame.gripper)
+    beside.to_parquet(tmp_path / "b.parquet")
+    text = beside.to_csv(index=False)
+    assert read(text).demonstrations.recorded.shape == (30, 2)
+    assert read_recordings(tmp_path / "b.parquet").demonstrations.recorded.shape == (30, 2)
+    assert kineme.Demonstrations.of(beside).recorded.shape == (30, 2)
+    assert read(text, columns=["x", "valid"]).demonstrations.recorded[:, 1].tolist() == frame.gripper.tolist()
     frame.to_parquet(tmp_path / "a.parquet")
     for demos in (kineme.Demonstrations.of(frame), read_recordings(tmp_path / "a.parquet").demonstrations):
         np.testing.assert_array_equal(demos.recorded[:, 1], frame.gripper)

@@ -44,7 +44,7 @@ SINGLE = {
     "an index that counts, with a name": _frame().rename_axis("part"),
     "dates in the index": pd.DataFrame({"x": X, "y": Y}, index=pd.Timestamp("2024-05-06") + pd.to_timedelta(T, "s")),
     "durations in the index": pd.DataFrame({"x": X, "y": Y}, index=pd.to_timedelta(T, "s")),
-    "beside counters, texts and velocities": _frame(frame=np.arange(50), note="a", v_x=X),
+    "beside counters, texts and velocities": _frame(frame=np.arange(50), note="a", v_x=X, on=True),
     "with missing numbers allowed": _frame().astype({"x": "Float64"}),
 }  # fmt: skip
 

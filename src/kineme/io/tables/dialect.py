@@ -48,10 +48,9 @@ class Dialect(NamedTuple):
     heads: tuple[str, ...]
     named: bool
     first: int  # line of the first sample, counted from 0
-    kinds: tuple[str, ...]  # "number", "date" or "text" per column
+    kinds: tuple[str, ...]  # "number", "flag", "date" or "text" per column
     measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
     end: int | None = None  # line after the last sample; None: the end of the file
-    flags: tuple[int, ...] = ()  # columns of numbers that are written as true and false
     names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
@@ -66,7 +65,7 @@ class Dialect(NamedTuple):
         return len(cells) == len(self.kinds) and all(
             is_number(cell, self.decimal_comma)
             for k, (cell, kind) in enumerate(zip(cells, self.kinds, strict=True))
-            if k and kind == "number" and k not in self.flags
+            if k and kind == "number"
         )
 
 
@@ -153,16 +152,16 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
                 f"them so{'' if heads else ', or name the columns in a first line'}"
             )
     # The first column without a head is of times, which no flag is.
-    flags = tuple(
+    flags = {
         k
         for k in range(0 if heads else 1, len(kinds))
         if flags_in([row[k] for row in body if k < len(row) and not is_missing(row[k])]) is not None
-    )
-    kinds = tuple("number" if k in flags else kind for k, kind in enumerate(kinds))
+    }
+    kinds = tuple("flag" if k in flags else kind for k, kind in enumerate(kinds))
     if heads:
-        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units, flags=flags)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
     names = tuple(f"column {k}" for k in range(len(kinds)))
-    return Dialect(separator, comma, names, False, first, kinds, flags=flags)
+    return Dialect(separator, comma, names, False, first, kinds)
 
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:

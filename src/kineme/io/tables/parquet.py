@@ -173,7 +173,7 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
     if STATE in lists:
         return {STATE}
     try:
-        kinds = ["text" if pa.types.is_boolean(kind) else _kind(kind) for kind in types]  # flags are beside positions
+        kinds = [_kind(kind) for kind in types]
         choose_roles(_without_commands(names, kinds, types, layout), kinds, layout)
     except DataError:
         if len(lists) > 1:
@@ -215,8 +215,9 @@ def _kind(kind: Any) -> str:
     of = pa.types
     if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
         return "date"
-    is_number = of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) or of.is_boolean(kind)
-    return "number" if is_number else "text"
+    if of.is_boolean(kind):
+        return "flag"
+    return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
 
 
 def _texts(column: Any, head: str) -> Any:

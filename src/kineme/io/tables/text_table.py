@@ -67,7 +67,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
-    texts |= {*dialect.flags}
+    flags = {k for k, kind in enumerate(dialect.kinds) if kind == "flag"}
+    texts |= flags
     if 0 in {roles.label, *roles.movement}:
         dialect = dialect._replace(names_rows=True)
     rows, faults = _rows(data, encoding, dialect, texts)
@@ -83,7 +84,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
                 f"lines that are left out; {remedy}, or remove those lines"
             )
     columns = [rows[name] for name in rows.dtype.names or ()]
-    for k in {*roles.positions} & {*dialect.flags}:
+    for k in flags & {*roles.positions}:
         cells = ["" if is_missing(cell) else cell.lower() for cell in columns[k].tolist()]
         columns[k] = np.array([FLAGS.get(cell, np.nan) for cell in cells])
         said = f"expected true or false in {dialect.heads[k]!r}"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, SpecificationError
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
 from kineme.movements.channels.coordinates import in_order, period_of, with_periods, wrap_period
-from kineme.movements.tables.columns import column_numbers
+from kineme.movements.tables.columns import DISCRETE_WORDS, column_numbers
 from kineme.movements.tables.layout import listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.units import UNITS, split_head, unit_named
@@ -41,13 +41,6 @@ ANGLE_WORDS = frozenset(
     {
         "joint", "joints", "angle", "angles", "theta", "yaw", "pitch", "roll", "heading", "azimuth", "elevation",
         "euler", "rotation", "flexion", "abduction", "rad", "radian", "radians", "deg", "degree", "degrees",
-    }
-)  # fmt: skip
-DISCRETE_WORDS = frozenset(
-    {
-        "gripper", "button", "buttons", "switch", "trigger", "flag", "contact", "mode", "grasp", "grasped",
-        "open", "closed", "digital", "event", "done", "success",
-        "suction", "vacuum",
     }
 )  # fmt: skip
 #: A column that has one of them is no angle, whatever else its head says: ``joint1_torque``, ``yaw rate``.

@@ -62,9 +62,19 @@ class Roles(NamedTuple):
     clocks: tuple[int, ...] = ()  # other columns of times, which have to show the same clock
 
 
-def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
-    """Find roles by heads and by what columns hold, "number", "date" or "text"; choices take precedence.
+DISCRETE_WORDS = frozenset(
+    {
+        "gripper", "button", "buttons", "switch", "trigger", "flag", "contact", "mode", "grasp", "grasped",
+        "open", "closed", "digital", "event", "done", "success",
+        "suction", "vacuum",
+    }
+)  # fmt: skip
 
+
+def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
+    """Find roles by heads and by what columns hold, "number", "flag", "date" or "text"; choices take precedence.
+
+    Flags, true and false, are coordinates where they are chosen, or where their heads say a gripper, a button or such.
     In a file without heads, not `named`, the first column of numbers is time and the others are coordinates.
     """
     if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
@@ -79,7 +89,12 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     beside = _nanoseconds(heads, kinds) if named else {}
     nanoseconds = None if time is None else beside.get(time)
     taken |= {time, *others, *beside, *beside.values()}
-    free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
+    steps = {
+        k
+        for k, head in enumerate(heads)
+        if kinds[k] == "flag" and (layout.coordinates is not None or DISCRETE_WORDS & {*words_of(head)})
+    }
+    free = [k for k in range(len(heads)) if k not in taken and (kinds[k] == "number" or k in steps)]
     if layout.coordinates is not None:
         positions = column_numbers(heads, layout.coordinates, free)
     else:
@@ -102,7 +117,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
             and not _is_left_over(heads[k], layout)
         )
     if not positions:
-        texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
+        texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] in ("text", "flag")]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
     used = {time, nanoseconds, label, *others, *movement, *positions}

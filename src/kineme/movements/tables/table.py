@@ -30,7 +30,7 @@ from kineme.movements.tables.time_stamps import (
 from kineme.validation import ROUNDED, Array, too_long_integer
 
 # Of NumPy -> of `choose_roles`.
-_KINDS = {"b": "number", "i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
+_KINDS = {"b": "flag", "i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
 _NUMBERS = (Real, Decimal)
 #: Cell in lower case -> number.
 FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
@@ -266,7 +266,9 @@ def _kind(values: NDArray[Any]) -> str:
     """Find the kind of a column; one with a number among texts has numbers, and is refused where it is a coordinate."""
     mixed = values.dtype.kind == "O" and (any(map(_is_number, values.tolist())) or _are_decimals(values.tolist()))
     are_flags = values.dtype.kind == "O" and flags_in(values.tolist()) is not None
-    return "number" if mixed or are_flags or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
+    if are_flags:
+        return "flag"
+    return "number" if mixed or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
 
 
 def _are_decimals(texts: list[str]) -> bool:
@@ -323,7 +325,7 @@ def flags_in(cells: Sequence[Any]) -> NDArray[np.float64] | None:
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
     if values.dtype.kind == "O" and (flags := flags_in(values.tolist())) is not None:
         return flags
-    if _KINDS.get(values.dtype.kind) != "number":
+    if _KINDS.get(values.dtype.kind) not in ("number", "flag"):
         i, got = next(((i, value) for i, value in enumerate(values.tolist()) if not _is_number(value)), (0, values[0]))
         raise DataError(
             f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, as by "
