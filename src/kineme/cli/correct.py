@@ -73,11 +73,11 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "symbols": sorted({str(change.stretch.row.label) for change in learned} - symbols),
             "contradicted": [
                 {
-                    "movement": one.movement, "recording": parsed.sources[one.stretch.recording].path,
-                    "place": parsed.sources[one.stretch.recording].place, "start": one.start, "end": one.end,
-                    "symbol": one.symbol, "now": one.stretch.row.label,
+                    "movement": example.movement, "recording": parsed.sources[example.stretch.recording].path,
+                    "place": parsed.sources[example.stretch.recording].place, "start": example.start,
+                    "end": example.end, "symbol": example.symbol, "now": example.stretch.row.label,
                 }
-                for one in contradicted(library.store, parsed, corrections)
+                for example in contradicted(library.store, parsed, corrections)
             ],
             "version": library.version,
             "dry_run": dry_run,
@@ -150,8 +150,8 @@ def _text(data: dict[str, Any], undo: str, problems: list[str]) -> str:
         ]  # fmt: skip
         lines.append(table(("recording", "start [s]", "end [s]", "symbol", "was", "change"), cells))
     others = [
-        (str(one["movement"]), *stretch_cells(one), printable(one["symbol"]), printable(one["now"] or "unknown"))
-        for one in data["contradicted"]
+        (str(row["movement"]), *stretch_cells(row), printable(row["symbol"]), printable(row["now"] or "unknown"))
+        for row in data["contradicted"]
     ]
     if others:
         title = "learned before, and not as it is now; remove what is wrong: kineme library delete --movement ID"

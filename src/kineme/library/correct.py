@@ -225,7 +225,7 @@ def contradicted(store: Store, recordings: Recordings, corrections: Corrections)
         if name is not None and (cut := _STRETCH.fullmatch(place or "")):
             examples.setdefault((files[source], cut[1] or ""), []).append((key, name, float(cut[2]), float(cut[3])))
     learned = {*corrections.examples}
-    found: list[Contradicted] = []
+    contradictions: list[Contradicted] = []
     for recording in sorted({stretch.recording for stretch in corrections.stretches}):
         source, offsets = recordings.sources[recording], recordings.demonstrations.offsets
         times = recordings.demonstrations.times[offsets[recording] : offsets[recording + 1]]
@@ -238,5 +238,5 @@ def contradicted(store: Store, recordings: Recordings, corrections: Corrections)
             ends = max(abs(now.start - first), abs(now.stop - last - 1))
             joins = now in learned and ends == 0  # in a dry run it has not yet
             if _shared(now, example) > _HALF and not joins and (name != now.row.label or ends > _SAME):
-                found.append(Contradicted(key, name, start, end, now))
-    return found
+                contradictions.append(Contradicted(key, name, start, end, now))
+    return contradictions
