@@ -276,3 +276,12 @@ def test_times_that_may_be_of_another_unit_and_derivatives_are_said(tmp_path):
     aside, rate = answer("learn", tmp_path / "a.csv", "--label", "a", "-l", tmp_path / "actions")["notes"]
     assert aside.startswith("left aside vy, ")
     assert rate == "0.5 samples per second are unusual; if the unit of time is another, give --units"
+
+
+def test_a_library_that_was_begun_without_names_says_in_which_order_columns_are_taken(recordings, demos, tmp_path):
+    with kineme.ActionLibrary(tmp_path / "unnamed", create=True) as library:
+        library.learn([demo.positions for demo in demos[:3]], ["C"] * 3)
+    (note,) = answer("learn", recordings / "GShape", "-l", tmp_path / "unnamed")["notes"]
+    assert "begun with columns without names: ['x', 'y'] are taken in this order" in note
+    assert answer("learn", recordings, "-l", tmp_path / "named")["notes"] == []
+    assert answer("learn", recordings, "-l", tmp_path / "named")["notes"] == []

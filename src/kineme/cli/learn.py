@@ -99,9 +99,29 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "people": sorted({name for name in people or () if name is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
-            "notes": [*parsed.notes, *notes_on_heads(parsed), *notes_on_samples(parsed)],
+            "notes": [
+                *parsed.notes,
+                *notes_on_heads(parsed),
+                *notes_on_samples(parsed),
+                *_notes_on_order(library, parsed),
+            ],
         }
     say(as_json, data, lambda: learned_text(data, problem_lines(parsed.problems, "left out ")))
+
+
+def _notes_on_order(library: Any, recordings: Any) -> list[str]:
+    """Say in which order named columns are taken by a library that was begun without names."""
+    from kineme.movements.channels.channel import recorded_names
+    from kineme.movements.channels.column_match import are_unknown
+    from kineme.movements.tables.layout import listed
+
+    channels = recordings.demonstrations.channels
+    if library.channels is not None or channels is None or are_unknown(channels):
+        return []
+    return [
+        f"the library was begun with columns without names: {listed(recorded_names(channels))} are taken in this order "
+        "and unit; see that those of other recordings are the same, or make another library"
+    ]
 
 
 def _of_pieces(
