@@ -144,6 +144,11 @@ def test_an_example_is_learned_and_another_hand_is_told_what_its_letters_look_li
     wait_until(page, "document.getElementById('library-count').textContent.startsWith('0 symbols')")
 
 
+def turn(overlay):
+    """By how much an example was turned, as captions say it."""
+    return f" turned by {overlay.turned:.0f}°" if overlay.turn else ""
+
+
 def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples, tmp_path):
     page = opened(copytree(examples / "letters", tmp_path / "own"))
     draw(page, strokes("G"))
@@ -159,7 +164,7 @@ def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples
         library.undo()
         explained = library.recognize(drawn).explain()
     assert [caption.split(";")[0] for caption in captions] == [
-        f"{role}: {overlay.label}, {overlay.similarity:.2f} alike"
+        f"{role}: {overlay.label}{turn(overlay)}, {overlay.similarity:.2f} alike"
         for role, overlay in (("Nearest", explained.nearest), ("Next", explained.runner_up))
     ]
     assert f"{100 * explained.nearest.differences.max():.0f} % of its size" in captions[0]
