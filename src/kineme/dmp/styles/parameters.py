@@ -69,11 +69,9 @@ def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None)
         check_primitives(movements)
     primitives = movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
     about = primitives.recorded_as
-    return (
-        primitives
-        if about is None
-        else without_turns(primitives, in_one_turn(primitives.starts, about.periods(primitives.starts)))
-    )
+    if about is None:
+        return primitives
+    return without_turns(primitives, in_one_turn(primitives.starts, about.periods(primitives.starts)))
 
 
 def without_turns(primitives: Primitives, turns: Array) -> Primitives:

@@ -29,6 +29,7 @@ from kineme.studio.server.records import Number, Point, RequestBody, Text, numbe
 from kineme.studio.server.refusals import in_studio_words
 from kineme.studio.server.rollout_routes import PrimitiveRequest, as_file, learned_as, name_of
 from kineme.studio.server.studio import Reads, Studio
+from kineme.validation import Array
 
 _ROS = {".yaml": write_action_goal, ".mcap": write_bag, ".bag": write_bag}  # beside the writers of tables
 ArmName = Annotated[str, InPath(max_length=200, description="Name of an arm, as in `/api/robots`.")]
@@ -210,7 +211,7 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
         body.at,
         body.goal,
         body.duration,
-        displacement=None if body.goal is not None else _way(body.displacement, learned, positions),
+        displacement=None if body.goal is not None else _way(body.displacement, learned, positions, example),
         scale=None if body.size is None or space == "joints" else body.size / extent,
         joints=arm,
         plane=body.plane,
@@ -227,13 +228,13 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
     )
 
 
-def _way(displacement: list[float] | None, learned: Learned, positions: list[int]) -> list[float] | None:
-    """Return the way of the positions; what moves beside them must move as it was shown."""
+def _way(displacement: list[float] | None, learned: Learned, positions: list[int], path: Array) -> list[float] | None:
+    """Return the way of the positions; what moves beside them must move as along the path (T, columns) shown."""
     names = learned.moving_columns
     if displacement is None or len(displacement) != len(names) or len(positions) == len(names):
         return displacement
-    recorded, moved = learned.example[[0, -1]], [learned.columns[k] for k in positions]
-    shown = dict(zip(learned.columns, recorded[1] - recorded[0], strict=True))
+    moved = [learned.columns[k] for k in positions]
+    shown = dict(zip(learned.columns, path[-1] - path[0], strict=True))
     way = dict(zip(names, displacement, strict=True))
     if other := [name for name in names if name not in moved and abs(way[name] - shown[name]) > _AS_SHOWN]:
         raise SpecificationError(
