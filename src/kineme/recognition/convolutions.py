@@ -63,22 +63,26 @@ def fit_kernels(series: Single) -> Kernels:
     """
     rng, (n, c, T) = np.random.default_rng(0), series.shape
     series = series[np.lexsort(series.reshape(n, -1)[:, :: max(1, c * T // 32)].T)]
-    dilations = tuple(range(1, (T - 1) // (_LENGTH - 1) + 1))
-    n_thresholds = max(1, _FEATURES // (84 * len(dilations)))
-    channels, thresholds = [], []
-    for at, dilation in enumerate(dilations):
+    # As in the source, evenly spaced in the logarithm: most thresholds are of kernels that are narrow.
+    exponents = np.linspace(0.0, np.log2((T - 1) / (_LENGTH - 1)), _FEATURES // 84)
+    dilations, n_thresholds = np.unique(np.floor(2.0**exponents).astype(int), return_counts=True)
+    channels, thresholds, drawn = [], [], 0
+    for dilation, n_each in zip(dilations.tolist(), n_thresholds.tolist(), strict=True):
         chosen = np.zeros((84, c), np.float32)
         for row in chosen:
             row[rng.permutation(c)[: int(2 ** rng.uniform(0, np.log2(min(c, _LENGTH) + 1)))]] = 1.0
         one_each = series[rng.integers(n, size=84)]
         own = _convolved(np.einsum("kct,kc->kt", one_each, chosen)[None], dilation)[0]
-        shares = ((at * n_thresholds * 84 + np.arange(84 * n_thresholds) + 1) * _GOLDEN % 1.0).reshape(84, -1)
+        shares = ((drawn + np.arange(84 * n_each) + 1) * _GOLDEN % 1.0).reshape(84, -1)
         # `numpy.quantile` takes the same shares of every row; of each its own they are interpolated here as there.
         ordered, place = np.sort(own, axis=1).astype(np.float64), shares * (T - 1)
         low, high = (np.take_along_axis(ordered, each(place).astype(np.intp), axis=1) for each in (np.floor, np.ceil))
         thresholds.append(low + (place % 1.0) * (high - low))
         channels.append(chosen)
-    return Kernels(dilations, tuple(channels), tuple((each + _TIE).astype(np.float32) for each in thresholds))
+        drawn += 84 * n_each
+    return Kernels(
+        tuple(dilations.tolist()), tuple(channels), tuple((each + _TIE).astype(np.float32) for each in thresholds)
+    )
 
 
 def _convolved(sums: Single, dilation: int) -> Single:
