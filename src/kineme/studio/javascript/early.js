@@ -89,15 +89,12 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     furthest = Math.max(ahead.progress, shown === leader ? furthest : 0);
     leader = shown;
     const unknown = share[classes.length];
+    const known = order.reduce((sum, c) => sum + share[c], 0);
     const remaining = ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k]));
     return {
       label: decided === null ? null : classes[decided],
       certainty: unknown > share[order[0]] ? null : "looks like",
-      ranked: order.map((c) => ({
-        label: classes[c],
-        confidence: share[c],
-        probability: share[c] / Math.max(1 - unknown, Number.MIN_VALUE),
-      })),
+      ranked: order.map((c) => ({ label: classes[c], confidence: share[c], probability: share[c] / known })),
       unknown,
       progress: Math.min(furthest, 1),
       arrival: times[n - 1] + ahead.seconds,
