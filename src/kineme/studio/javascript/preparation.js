@@ -5,10 +5,14 @@ const SHARE = 0.1; // of its usual step: closer samples are averaged before a sp
 const QUANTILE = 0.75; // of the gaps: the usual step
 const TIME_SHARE = 1e-3; // of the arc-length phase, which keeps it rising through pauses
 const MIN_SAMPLES = 4;
+const JUMP = 0.75; // of a period: a step at least this long is a wrap, and no motion
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
-/** A movement, checked: positions are T samples of d numbers, or all of these in a row. @returns {TimedPositions} */
-export function movement(times, positions, d) {
+/**
+ * A movement, checked: positions are T samples of d numbers, or all of these in a row. Angles of the columns of a library
+ * lose the jumps where they wrap. @returns {TimedPositions}
+ */
+export function movement(times, positions, d, columns = null) {
   const rows = Array.from(positions, (row) => (typeof row === "number" ? row : [...row]));
   const flat = Float64Array.from(rows.flat());
   const t = Float64Array.from(times);
@@ -22,6 +26,14 @@ export function movement(times, positions, d) {
   for (let k = 1; k < t.length; k++) {
     if (!(t[k] > t[k - 1])) throw new Error(`expected rising times, got ${t[k - 1]}, ${t[k]} at ${k}; sort them`);
   }
+  columns?.forEach(({ period }, k) => {
+    for (let j = k, turns = 0, last = flat[k]; period && j < flat.length; j += d) {
+      const step = flat[j] - last;
+      last = flat[j];
+      turns += Math.sign(step) * Math.floor(Math.abs(step) / period + 1 - JUMP);
+      flat[j] -= period * turns;
+    }
+  });
   return { times: t, positions: flat, d };
 }
 
