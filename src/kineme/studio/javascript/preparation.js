@@ -8,17 +8,22 @@ const MIN_SAMPLES = 4;
 const JUMP = 0.75; // of a period: a step at least this long is a wrap, and no motion
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
+const number = (x) => (typeof x === "number" ? x : NaN);
+
 /**
  * A movement, checked: positions are T samples of d numbers, or all of these in a row. Angles of the columns of a library
  * lose the jumps where they wrap. @returns {TimedPositions}
  */
 export function movement(times, positions, d, columns = null) {
-  const rows = Array.from(positions, (row) => (typeof row === "number" ? row : [...row]));
-  const flat = Float64Array.from(rows.flat());
-  const t = Float64Array.from(times);
+  /** @type {any[]} */
+  const rows = Array.from(positions, (row) => (row?.length ? [...row] : row));
+  const flat = Float64Array.from(rows.flat(), number);
+  const t = Float64Array.from(times, number);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
-  if (flat.length !== t.length * d) {
-    throw new Error(`expected ${t.length} samples of ${d} numbers, got ${flat.length} numbers; give one of each`);
+  const inRows = rows.length === flat.length || rows.every((row) => row?.length === d);
+  if (!inRows || flat.length !== t.length * d) {
+    const got = `${rows.length} of ${rows[0]?.length ?? 1}`;
+    throw new Error(`expected ${t.length} samples of ${d} numbers, got ${got}; give one of each`);
   }
   if (!flat.every((x) => Math.abs(x) <= LARGEST) || !t.every((x) => Math.abs(x) <= Math.sqrt(LARGEST))) {
     throw new Error("expected finite positions up to 1e100 and times up to 1e50 s, got others; leave them out");
