@@ -200,17 +200,15 @@ def test_names_are_text_and_what_is_saved_is_what_is_shown(opened):
     np.testing.assert_allclose(rows[:, 1:], page.evaluate("kineme.state.moving.positions"), rtol=1e-8, atol=1e-9)
 
 
-def test_what_is_saved_has_the_names_and_units_that_were_learned(tabs, tmp_path):
+def test_what_is_saved_has_the_names_and_units_that_were_learned(opened, pages, tmp_path):
     """So that it is recognized as it was learned: under x and y these would be swapped."""
     demos = kineme.load_lasa(SHAPES[:3])[::2]
     channels = tuple(Channel(f"{axis} [mm]", "position", (f"{axis} [mm]",), "mm") for axis in "yx")
     named = kineme.Demonstrations.of_movements(of_channels(demos.movements, channels))
     with kineme.ActionLibrary(tmp_path / "named", create=True) as library:
         library.learn(named, list(demos.labels))
-        write_page(tmp_path / "named.html", library)
-        page = tabs.new()
-        page.goto((tmp_path / "named.html").as_uri())
-        wait_until(page, "window.kineme !== undefined")
+        write_page(pages / "named.html", library)
+        page = opened("named")
         page.get_by_role("button", name="GShape").click()
         with page.expect_download() as download:
             page.get_by_role("button", name="Save CSV").click()
