@@ -50,6 +50,17 @@ def test_what_fails_a_check_is_not_written_without_force(wave):
     assert (wave / "joints.csv").exists()
 
 
+def test_the_order_of_the_axes_in_a_file_moves_no_joint_otherwise(wave):
+    t, x, y, z, _ = np.loadtxt("wave.csv", delimiter=",", skiprows=1).T
+    written = []
+    for name, columns in (("x,y,z", (x, y, z)), ("z,x,y", (z, x, y))):
+        np.savetxt("order.csv", np.column_stack((t, *columns)), delimiter=",", header=f"time,{name}", comments="")
+        result = run("order.csv", "--robot", "panda", "--at", "0.45,-0.2,0.3", "--slow-down", "-o", f"{name[0]}.csv")
+        assert result.exit_code == 0, result.output
+        written.append(np.loadtxt(f"{name[0]}.csv", delimiter=",", skiprows=1))
+    np.testing.assert_allclose(*written, atol=1e-6)
+
+
 def test_a_goal_needs_a_start(wave):
     result = run("wave.csv", "--robot", "panda", "--goal", "0.5,0,0.4")
     assert result.exit_code == 2

@@ -9,9 +9,10 @@ from kineme import ActionLibrary, Demonstrations
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.planning import SkillTools, outside, skill_of
-from kineme.planning.preview import nearest_inside, plan_symbol
+from kineme.planning.preview import nearest_inside, plan_symbol, preview_skill, standing_place
 from kineme.planning.skill import move_to, nearest_demonstration
 from kineme.robots import load
+from kineme.robots.kinematics.descent import kinematics
 
 U = np.linspace(0.0, 1.0, 100)
 EASED = U**3 * (10 - 15 * U + 6 * U**2)
@@ -127,3 +128,21 @@ def test_places_are_those_of_their_columns_where_a_quaternion_comes_first(tmp_pa
         recorded = move_to(library, skill, start, goal).demonstrations[0].recorded
     np.testing.assert_allclose(recorded[[0, -1], 4:], [start, goal], atol=1e-9)
     np.testing.assert_allclose(np.abs(recorded[[0, -1], :4]), np.abs(quaternions[[0, -1]]), atol=1e-6)
+
+
+def test_a_tip_goes_to_its_axes_in_whichever_order_a_file_has_them(tmp_path):
+    """Every word of the preview is true of the movement that is sent."""
+    robot, ends = load("panda"), []
+    for order in ([0, 1, 2], [2, 1, 0]):
+        axes = ["xyz"[k] for k in order]
+        channels = tuple(Channel(axis, "position", (axis,), "m") for axis in axes)
+        path = [0.31, 0.0, 0.48] + EASED[:, None] * [0.1, 0.2, -0.1]
+        plain = Demonstrations.from_arrays([path[:, order]], ["carry"], [3.0 * U])
+        with ActionLibrary(tmp_path / "".join(axes), create=True) as library:
+            library.learn(Demonstrations.of_movements(of_channels(plain.movements, channels)))
+            skill = skill_of(library, "carry")
+            moved = preview_skill(library, skill, robot, robot.rest, skill.starts[0], skill.goals[0], 3.0).movement
+            ends.append(moved.path.positions[[0, -1]])
+            tip = kinematics(robot, robot.rest[None])[0][0]
+            np.testing.assert_allclose(standing_place(library, skill, robot, robot.rest), tip[order])
+    np.testing.assert_allclose(ends, [path[[0, -1]]] * 2, atol=1e-6)

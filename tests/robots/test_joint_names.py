@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from kineme.io.writing.write_movement import write_movement
 from kineme.movements.channels.channel import Channel
 from kineme.robots import load, move
 from kineme.robots.planning.move import request_of
-from kineme.robots.planning.roles import check_order, joints_among, space_of
+from kineme.robots.planning.roles import axis_order, check_order, joints_among, roles_of, space_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -145,3 +146,28 @@ def test_angles_beside_the_position_of_the_tip_are_refused(tmp_path):
     names = ("x", "y", "z", "roll", "pitch", "yaw")
     with pytest.raises(TrajectoryError, match="the angles roll, pitch, yaw; convert them to columns qw, qx, qy, qz"):
         _moved(tmp_path, names, 0.3 + np.linspace(0, 0.1, 50)[:, None] * np.ones(6))
+
+
+@pytest.mark.parametrize("head", ["{} [mm]", "tip_{}", "{}_tip", "pose.position.{}"])
+def test_the_axes_of_a_tip_are_those_of_its_names(head, tmp_path):
+    """In whichever order a file has them, in space and in a plane."""
+    robot = load("panda")
+    size = 1e3 if "mm" in head else 1.0
+    path = np.array([0.31, 0.0, 0.48]) + 0.1 * np.linspace(0, 1, 30)[:, None] * [1.0, 2.0, -1.0]
+    for n in (2, 3):
+        for order in permutations(range(3), n):
+            names = [head.format("xyz"[k]) for k in order]
+            rows = np.column_stack((np.linspace(0, 2, 30), size * path[:, order]))
+            np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(("time", *names)), comments="")
+            request = request_of(read_recordings(tmp_path / "a.csv"), robot, "auto")
+            assert request.space == "tip"
+            np.testing.assert_allclose(request.positions, path[:, sorted(order)], atol=1e-12)
+
+
+def test_a_tip_of_other_names_keeps_their_order_unless_an_axis_is_out_of_place():
+    assert axis_order(["z", "x", "y"]) == [1, 2, 0]
+    assert axis_order(["x", "y", "height"]) == axis_order(["first", "second", "third"]) == [0, 1, 2]
+    for names in (("height", "x", "y"), ("a_x", "b_x", "a_y"), ("width", "x")):
+        channels = tuple(Channel(name, "position", (name,)) for name in names)
+        with pytest.raises(TrajectoryError, match=r"expected the positions of the tip as x, y, z.*rename them"):
+            roles_of(channels, len(names), "tip")

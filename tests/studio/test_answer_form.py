@@ -133,3 +133,22 @@ def test_a_movement_under_way_has_one_form(client, folder):
         STATE.validate(drawn)
         _same(drawn, {key: expected[key] for key in drawn})
         assert expected.keys() - drawn.keys() == {"skipped", "status"}
+
+
+@pytest.mark.skipif(NODE is None, reason=REASON)
+@pytest.mark.parametrize("slower", [1, 50, 1e4, 1e40])
+def test_classes_of_a_movement_unlike_all_share_one(folder, slower):
+    """However little is left to them beside unknown, whose share is 1 in floating point."""
+    movement = _movement(KINDS[0])
+    slow = Trajectory(slower * movement.times, movement.positions)
+    with ActionLibrary(folder, read_only=True) as library:
+        snapshot = snapshot_of_library(library, early=DRAWN)
+        state = library.stream(early=DRAWN).update(slow.times, slow.positions)
+    drawn = ask(snapshot, [question("follow", slow, ends=[len(slow)])])[0][0]
+    expected = json.loads(json.dumps(state.to_dict(), allow_nan=False))
+    for form in (expected, drawn):
+        STATE.validate(form)
+        assert sum(guess["probability"] for guess in form["ranked"]) == pytest.approx(1.0)
+    assert drawn["ranked"][0]["label"] == expected["ranked"][0]["label"]
+    assert expected["ranked"][0]["probability"] == pytest.approx(drawn["ranked"][0]["probability"], abs=1e-3)
+    assert list(state.probabilities.values()) == sorted(state.probabilities.values(), reverse=True)

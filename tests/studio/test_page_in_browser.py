@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import kineme
 from browsing import Pages, stroke, wait_until
+from kineme.movements.channels.channel import Channel
+from kineme.movements.trajectories.movements import of_channels
 from kineme.studio.page.write_page import write_page
 from soaking import SOAK
 
@@ -192,7 +196,25 @@ def test_names_are_text_and_what_is_saved_is_what_is_shown(opened):
     with page.expect_download() as download:
         page.get_by_role("button", name="Save CSV").click()
     rows = np.loadtxt(download.value.path(), delimiter=",", skiprows=1)
+    assert Path(download.value.path()).read_text().splitlines()[0] == '"t [s]","x","y"'
     np.testing.assert_allclose(rows[:, 1:], page.evaluate("kineme.state.moving.positions"), rtol=1e-8, atol=1e-9)
+
+
+def test_what_is_saved_has_the_names_and_units_that_were_learned(opened, pages, tmp_path):
+    """So that it is recognized as it was learned: under x and y these would be swapped."""
+    demos = kineme.load_lasa(SHAPES[:3])[::2]
+    channels = tuple(Channel(f"{axis} [mm]", "position", (f"{axis} [mm]",), "mm") for axis in "yx")
+    named = kineme.Demonstrations.of_movements(of_channels(demos.movements, channels))
+    with kineme.ActionLibrary(tmp_path / "named", create=True) as library:
+        library.learn(named, list(demos.labels))
+        write_page(pages / "named.html", library)
+        page = opened("named")
+        page.get_by_role("button", name="GShape").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save CSV").click()
+        (saved := tmp_path / "saved.csv").write_bytes(Path(download.value.path()).read_bytes())
+        assert saved.read_text().splitlines()[0] == '"t [s]","y [mm]","x [mm]"'
+        assert library.recognize(kineme.read_recordings(saved))[0].label == "GShape"
 
 
 def plane_of(positions):

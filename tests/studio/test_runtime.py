@@ -623,3 +623,33 @@ def test_a_movement_that_cannot_be_used_is_refused_in_words():
     query["positions"] = (movement.positions / np.ptp(movement.positions) * 1e102).tolist()
     with pytest.raises(AssertionError, match="up to 1e100"):
         ask(snapshot, [query])
+    rows = movement.positions.tolist()
+    for wrong, message in (
+        ([[None, row[1]] if k == 5 else row for k, row in enumerate(rows)], "finite positions"),
+        ([[str(row[0]), row[1]] for row in rows], "finite positions"),
+        (movement.positions.T.tolist(), "80 samples of 2 numbers, got 2 of 80"),
+        ([row if k else row[:1] for k, row in enumerate(rows)], "80 samples of 2 numbers"),
+    ):
+        with pytest.raises(AssertionError, match=message):
+            ask(snapshot, [question("recognize", movement) | {"positions": wrong}])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"symbol": "nope"}, "expected one of kind 00, kind 01, got another name"),
+        ({"wish": {"goal": [1]}}, "2 finite numbers for start, goal and via points, got 1"),
+        ({"wish": {"goal": None}}, "2 finite numbers"),
+        ({"wish": {"goal": [None, 1]}}, "2 finite numbers"),
+        ({"wish": {"start": ["1", "2"]}}, "2 finite numbers"),
+        ({"wish": {"via": [[0.5, [1]]]}}, "2 finite numbers"),
+        ({"wish": {"duration": 0}}, "a duration above 0 s, got 0"),
+        ({"wish": {"duration": -1}}, "a duration above 0 s, got -1"),
+    ],
+)
+def test_a_new_movement_that_cannot_be_is_refused_in_words(wrong, message):
+    snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([1, 1])))
+    asked = {"ask": "rollout", "symbol": "kind 00", "wish": {"goal": [1, 2], "duration": 2}}
+    assert ask(snapshot, [asked])[0]["positions"][-1] == pytest.approx([1, 2], abs=0.1)
+    with pytest.raises(AssertionError, match=message):
+        ask(snapshot, [asked | wrong])

@@ -17,6 +17,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation import pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import of_channels
 from kineme.recognition import conformal
 from kineme.recognition.early import evidence, hypotheses
 from kineme.studio.snapshot import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
@@ -107,6 +108,33 @@ def test_a_library_of_two_hands_answers_in_the_runtime_as_it_does_in_python(tmp_
         snapshot = snapshot_of_library(library)
         compare_answers(snapshot, others, library.recognize(others))
     assert snapshot.header["comparison"]["rule"]["n_points"] == 2
+
+
+@pytest.mark.skipif(NODE is None, reason=REASON)
+def test_a_library_of_angles_answers_alike_where_they_wrap(tmp_path):
+    """Also under way, as an encoder gives them: from -180 to 180 degrees."""
+    channels = tuple(Channel(name, "angle", (name,), "deg") for name in ("pan", "lift"))
+    shapes = draw_shapes([5, 5, 5], 2, seed=1)
+    turned = [100 * one.positions / np.ptp(one.positions) for one in shapes]
+    wrapped = [(x - x[:1] + 350) % 360 - 180 for x in turned]
+    assert sum(bool((np.abs(np.diff(x, axis=0)) > 300).any()) for x in wrapped) > 5
+    rows = Demonstrations.from_arrays(wrapped, list(shapes.labels), [one.times for one in shapes])
+    shown = Demonstrations.of_movements(of_channels(rows.movements, channels))
+    own = np.arange(15) % 5 < 4
+    with library_of(tmp_path / "actions", shown[own]) as library:
+        others = [kineme.Trajectory(one.times, wrapped[k]) for k, one in enumerate(shapes) if not own[k]]
+        snapshot = snapshot_of_library(library)
+        said = [library.recognize(one) for one in others]
+        states = [library.stream().update(one.times, one.positions) for one in others]
+        compare_answers(snapshot, others, said)
+        asked = [question("follow", one, ends=[len(one)]) for one in others]
+        for (got,), state in zip(ask(snapshot, asked), states, strict=True):
+            assert got["ranked"][0]["label"] == state.ranked[0].label
+            np.testing.assert_allclose(got["path"], state.path, atol=1e-2)
+        assert len({answer.label for answer in said} - {None}) == 3
+    assert snapshot.header["columns"] == [
+        {"head": "pan [deg]", "period": 360.0}, {"head": "lift [deg]", "period": 360.0}
+    ]  # fmt: skip
 
 
 @pytest.mark.skipif(NODE is None, reason=REASON)

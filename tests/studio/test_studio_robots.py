@@ -214,3 +214,16 @@ def test_a_goal_that_was_dragged_is_met_by_what_has_an_orientation(poses, arms):
     np.testing.assert_allclose(of_all[-1] - of_all[0], way[positions], atol=1e-4)
     way[shown["columns"].index("qz")] += 0.1
     assert "a displacement of x [m], y [m], z [m] alone" in _move(client, symbol, displacement=way.tolist()).text
+
+
+def test_a_displacement_is_that_of_its_columns_in_whichever_order_they_are(tmp_path, open_studio, arms):
+    s = np.linspace(0, 1, 100)
+    table = np.column_stack((2 * s, 0.4 - 0.05 * s, 0.05 * np.sin(np.pi * s), 0.3 + 0.1 * s))
+    np.savetxt(tmp_path / "pick.csv", table, delimiter=",", header="time,z [m],y [m],x [m]", comments="")
+    with ActionLibrary(tmp_path / "heights", create=True) as library:
+        library.learn(read_recordings(tmp_path / "pick.csv").demonstrations, ["pick"])
+    client = open_studio(tmp_path / "heights")
+    symbol = client.get("/api/library").json()["symbols"][0]["id"]
+    moved = _move(client, symbol, at=[0.45, 0.0, 0.45], size=0.1, displacement=[-0.04, 0.01, 0.1])
+    wanted = np.array(moved.json()["scene"]["wanted"])
+    np.testing.assert_allclose(wanted[-1] - wanted[0], [0.1, 0.01, -0.04], atol=1e-4)

@@ -13,7 +13,7 @@ import pytest
 from node_runtime import NODE, REASON, ask
 from studio_samples import drawing, make_library
 
-from kineme import DMP, ActionLibrary, Demonstrations, Trajectory
+from kineme import DMP, ActionLibrary, Demonstrations, Trajectory, read_recordings
 from kineme.datasets import load_example
 from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.dmp.generation.generate import MovementOptions, learn_one
@@ -49,6 +49,31 @@ def test_a_symbol_moves_as_demonstrated_and_to_another_goal(client, symbol):
     assert other["positions"][-1] == pytest.approx([3.0, -1.0])
     assert other["times"][-1] == pytest.approx(4.0)
     assert (other["goal"], other["warnings"]) == ([3.0, -1.0], [])
+
+
+def test_an_angle_is_taken_in_the_turn_of_the_recording_as_in_the_shell(open_studio, tmp_path):
+    """A goal of 59 degrees is 419 where the joint turned from 173 to 419; one that is dragged stays where it is."""
+    t = np.linspace(0, 1.2, 60)
+    yaw = 172.9 + 246.3 * t / 1.2
+    table = np.column_stack((t, 0.3 * t, (yaw + 180) % 360 - 180))
+    np.savetxt(tmp_path / "yaw.csv", table, delimiter=",", header="t,x,yaw [deg]", comments="")
+    with ActionLibrary(tmp_path / "yaw", create=True) as library:
+        library.learn(read_recordings(tmp_path / "yaw.csv").demonstrations, ["turn"])
+    client, what = open_studio(tmp_path / "yaw"), {"movement": 1}
+    shown, goal = _rollout(client, what), [0.3, 59.0]
+    turned = _rollout(client, what, goal=goal, start=[0.0, -187.0])
+    assert (turned["goal"], turned["positions"][0][1]) == ([0.3, 419.0], pytest.approx(173.0))
+    assert turned["positions"][-1] == pytest.approx([0.3, 419.0])
+    assert np.ptp(turned["positions"], axis=0)[1] == pytest.approx(np.ptp(shown["positions"], axis=0)[1], rel=0.05)
+    assert turned["warnings"] == [
+        "start -187 of yaw [deg] is taken as 173, in the turn of the recording",
+        "goal 59 of yaw [deg] is taken as 419, in the turn of the recording",
+    ]
+    saved = client.post("/api/export", json={"what": what, "goal": goal, "format": "json"}).json()
+    assert np.array(saved["positions"])[-1][1] == pytest.approx(419.0)
+    dragged = _rollout(client, what, goal=goal, in_turn=False)
+    assert (dragged["goal"], dragged["warnings"]) == (goal, [])
+    assert dragged["positions"][-1] == pytest.approx(goal)
 
 
 def test_it_passes_via_points_at_their_time(client, symbol):

@@ -50,7 +50,7 @@ def generate(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     import numpy as np
 
-    from kineme.dmp.generation.generate import MovementOptions, checked_point
+    from kineme.dmp.generation.generate import MovementOptions, checked_point, in_turn
     from kineme.dmp.generation.generate import generate as make
     from kineme.io.writing.write_movement import encode_movement, write_movement
 
@@ -64,7 +64,9 @@ def generate(**options: Any) -> None:
     points: dict[str, Any] = {name: None if point is None else np.array(point) for name, point in given.items()}
     for name in ("start", "goal"):
         checked_point(learned, points[name], f"--{name}")
-        points[name] = _in_turn(learned, points[name], name)
+        points[name], said = in_turn(learned, points[name], name)
+        for sentence in said:
+            write(f"note: --{printable(sentence)}", err=True)
     movement_options = MovementOptions(**points, **{name: options[name] for name in ("duration", "rate", "settle")})
     movement = make(learned, movement_options)
     warn_of_bad_fit(learned)
@@ -87,29 +89,6 @@ def generate(**options: Any) -> None:
         write_bytes(encode_movement(movement.columns, ending, movement.names))
     else:
         write_movement(options["output"], movement.columns, movement.names)
-
-
-def _in_turn(learned: Any, point: Any, name: str) -> Any:
-    """Return a start or goal with angles in the turn in which the recording starts or ends, and say what is turned."""
-    import numpy as np
-
-    from kineme.dmp.recorded_as import primitive_columns
-    from kineme.movements.channels.coordinates import turns_beyond
-
-    about = learned.primitive.to_recording
-    if point is None or about is None:
-        return point
-    order, near = primitive_columns(about.moving), getattr(learned.primitive, f"{name}s")[0]
-    periods = about.periods(np.stack((point[order], near)))
-    turned = np.array(point, dtype=np.float64)
-    turned[order] -= turns_beyond(turned[order][None], near, periods)[0]
-    for column, asked, taken in zip(learned.moving_columns, point.tolist(), turned.tolist(), strict=True):
-        if asked != taken:
-            write(
-                f"note: --{name} {asked:g} of {printable(column)} is taken as {taken:g}, in the turn of the recording",
-                err=True,
-            )
-    return turned
 
 
 def warn_of_bad_fit(learned: Any) -> None:

@@ -24,6 +24,9 @@ from kineme.library.members import Members, members_of, some_of_each
 from kineme.library.recognize import known_members
 from kineme.library.storage import read
 from kineme.library.storage.symbols import symbol
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import period_by_unit
+from kineme.movements.channels.detect import unit_of
 from kineme.movements.preparation import pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
@@ -106,6 +109,7 @@ def recognition_parts(classes: KnownClasses) -> Snapshot:
     }
     header = {
         "n_movements": len(classes.references),
+        "columns": _columns(demos.channels),
         "classes": [str(name) for name in classes.references.classes.tolist()],
         "first": classes.references.first.tolist(),
         "comparison": _comparison(classes.comparison, classes.references.described.pairs, arrays),
@@ -116,6 +120,22 @@ def recognition_parts(classes: KnownClasses) -> Snapshot:
     if header["comparison"]["details"] is not None:
         arrays["detailed rows"] = feature_rows(demos, classes.comparison.specification)[-1].astype(np.float32)
     return Snapshot(header, arrays)
+
+
+def _columns(channels: Channels | None) -> list[dict[str, Any]] | None:
+    """Write the heads of the coordinates, with their units, and what angles wrap by; None where they have no names."""
+    return (
+        None
+        if channels is None
+        else [
+            {
+                "head": f"{name} [{channel.unit}]" if channel.unit and unit_of(name) is None else name,
+                "period": (period_by_unit(channel.unit) or channel.period or None) if channel.kind == "angle" else None,
+            }
+            for channel in channels
+            for name in channel.coordinates
+        ]
+    )
 
 
 def _comparison(how: Comparison, pairs: Pairs | None, arrays: _Arrays) -> dict[str, Any]:

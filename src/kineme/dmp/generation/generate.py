@@ -17,7 +17,7 @@ from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnin
 from kineme.io.arrays.npz import kind_of
 from kineme.io.writing.write_movement import ColumnNames, Columns
 from kineme.movements.channels.channel import learned_names, recorded_names
-from kineme.movements.channels.coordinates import as_wxyz, columns_of
+from kineme.movements.channels.coordinates import as_wxyz, columns_of, turns_beyond
 from kineme.movements.rotations import NORM_TOLERANCE, angle_between
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import LARGEST, Array
@@ -100,6 +100,21 @@ def checked_point(learned: Learned, point: Array | None, name: str) -> Array | N
                 "check the order of the columns, or divide it by its norm"
             )
     return point if about is None else point[primitive_columns(about.moving)]
+
+
+def in_turn(learned: Learned, point: Array | None, name: str) -> tuple[Array | None, list[str]]:
+    """Return a start or goal with angles in the turn in which the recording starts or ends, and what is turned."""
+    about = learned.primitive.to_recording
+    if point is None or about is None:
+        return point, []
+    order, near = primitive_columns(about.moving), getattr(learned.primitive, f"{name}s")[0]
+    turned = np.array(point, dtype=np.float64)
+    turned[order] -= turns_beyond(turned[order][None], near, about.periods(np.stack((point[order], near))))[0]
+    return turned, [
+        f"{name} {asked:g} of {column} is taken as {taken:g}, in the turn of the recording"
+        for column, asked, taken in zip(learned.moving_columns, point.tolist(), turned.tolist(), strict=True)
+        if asked != taken
+    ]
 
 
 def _signed(columns: Array, learned: Learned) -> Array:

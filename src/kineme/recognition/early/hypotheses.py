@@ -49,6 +49,7 @@ LOG_UNKNOWN = -0.5 * (1.5 / SHARE) ** 2 - 1.5
 #: Exponent of the shares. Elastic paths, point clouds, size, duration and timing are not independent: with 1, labels
 #: with a share of 0.9 are right less often than that for people without demonstrations.
 TEMPER = 0.8
+_MOST_UNKNOWN = 600.0  # by which its logarithm is above that of all classes at most: their shares do not become 0
 #: A movement that explains a beginning perfectly does so at about one in 20 values of progress.
 EXPLAINING = 20
 _MOST_PROGRESS = 1000  # beginnings of one movement
@@ -170,6 +171,7 @@ class Hypotheses(NamedTuple):
     def shares(self, evidence: Array) -> Array:
         """Return the share of each class, and, last, of an unknown movement, in the evidence to 0.8: (n, C + 1)."""
         logs = TEMPER * self.log_classes(evidence)
+        logs[:, -1] = np.minimum(logs[:, -1], logs[:, :-1].max(axis=1) + _MOST_UNKNOWN)
         shares = np.exp(logs - logs.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 

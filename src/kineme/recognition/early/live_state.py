@@ -6,8 +6,6 @@ import math
 from enum import Flag, auto
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from kineme.movements.trajectories.labels import Label
 from kineme.recognition.answer import Certainty, in_words
 from kineme.validation import Array
@@ -97,10 +95,8 @@ class LiveState(NamedTuple):
     @property
     def probabilities(self) -> dict[Label, float]:
         """Probability of each class if the movement is of a known one, most likely first: as that of an `Answer`."""
-        return {guess.label: self._probability(guess) for guess in self.ranked}
-
-    def _probability(self, guess: Guess) -> float:
-        return guess.confidence / max(1.0 - self.unknown, np.finfo(float).tiny)
+        known = sum(guess.confidence for guess in self.ranked) or 1.0  # 1 - unknown may be 0 by cancellation
+        return {guess.label: guess.confidence / known for guess in self.ranked}
 
     def to_dict(self, top: int | None = None) -> dict[str, Any]:
         """Return the state as plain data that JSON can hold; what it shares with `Answer.to_dict` has the same keys.
@@ -120,11 +116,12 @@ class LiveState(NamedTuple):
         unknown, progress, arrival = (
             value if math.isfinite(value) else None for value in (self.unknown, self.progress, self.arrival)
         )
+        probabilities = self.probabilities
         return {
             "label": None if self.label is None else str(self.label),
             "certainty": self.certainty,
             "ranked": [
-                {"label": str(guess.label), "confidence": guess.confidence, "probability": self._probability(guess)}
+                {"label": str(guess.label), "confidence": guess.confidence, "probability": probabilities[guess.label]}
                 for guess in self.ranked[:top]
             ],
             "unknown": unknown,

@@ -22,6 +22,7 @@ from kineme.validation import Array
 DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
 #: Words of columns that say how joints move, and not where they are.
 _RATES = {"velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current"}
+_AXES = "xyz"
 _SIDES = ("left", "right")  # what names of two arms begin with
 _Words = tuple[str, ...]
 
@@ -54,6 +55,7 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     """Roles of recorded columns, of which nothing but the number is known if they have no channels, or no names.
 
     Columns with the names of joints are these, others go along; as many of other names are joints in their order.
+    Positions of the tip are in the order of the axes that their names say.
     """
     if channels is None or (space == "tip" and are_unknown(channels)):
         posed = space == "tip" and n_columns == 7
@@ -84,6 +86,8 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         along = [along[k] for k in joints]
     elif robot is not None and space == "joints" and len(along) == robot.n_joints:
         check_order(names, robot)
+    elif space == "tip" and len(along) in (2, 3):
+        along = [along[k] for k in axis_order(names)]
     return Roles(
         [column for _, column in along],
         tuple(channel for channel, _ in along),
@@ -211,6 +215,23 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
         return columns
     words, joints = [words_of(name_of(name)) for name in names], list(map(words_of, robot.joints))
     return _single(_holding(words, joints)) or _differing(words, joints)
+
+
+def axis_order(names: Sequence[str]) -> list[int]:
+    """Return the columns in the order x, y, z that their names say, as ``tip_z``; in theirs if these say no axes.
+
+    Raises `TrajectoryError` where names of axes are in another order among others, of which the axis is not known.
+    """
+    said = [[word for word in words_of(name_of(name)) if word in {*_AXES}] for name in names]
+    axes = ["".join(words) if len(words) == 1 else "" for words in said]
+    if all(axes) and len({*axes}) == len(axes):
+        return sorted(range(len(axes)), key=axes.__getitem__)
+    if any(axis and _AXES.index(axis) < k for k, axis in enumerate(axes)):
+        raise TrajectoryError(
+            f"expected the positions of the tip as x, y, z or in this order, got {', '.join(names)}; choose them with "
+            "columns=, in the shell --columns, or rename them"
+        )
+    return list(range(len(axes)))
 
 
 def check_order(names: Sequence[str], robot: Robot) -> None:

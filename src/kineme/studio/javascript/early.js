@@ -62,7 +62,7 @@ function decision(confidence, patience) {
 
 /** Follow one movement, given the hypotheses; see `kineme.Recognizer.stream`. */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
-  const { classes, comparison: how, early } = stored.recognizer.header;
+  const { classes, columns, comparison: how, early } = stored.recognizer.header;
   const { n_dims: d, cutoff, pauses } = how;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
@@ -73,7 +73,7 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   return (times, positions) => {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
-    const soFar = movement(times, positions, d);
+    const soFar = movement(times, positions, d, columns);
     const active = withoutPauses(soFar, early.pauses);
     const duration = active.times.at(-1) - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
@@ -89,15 +89,12 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     furthest = Math.max(ahead.progress, shown === leader ? furthest : 0);
     leader = shown;
     const unknown = share[classes.length];
-    const remaining = ahead.remaining.map((x) => x.map((value, k) => value + positions[n - 1][k]));
+    const known = order.reduce((sum, c) => sum + share[c], 0);
+    const remaining = ahead.remaining.map((x) => x.map((value, k) => value + soFar.positions[(n - 1) * d + k]));
     return {
       label: decided === null ? null : classes[decided],
       certainty: unknown > share[order[0]] ? null : "looks like",
-      ranked: order.map((c) => ({
-        label: classes[c],
-        confidence: share[c],
-        probability: share[c] / Math.max(1 - unknown, Number.MIN_VALUE),
-      })),
+      ranked: order.map((c) => ({ label: classes[c], confidence: share[c], probability: share[c] / known })),
       unknown,
       progress: Math.min(furthest, 1),
       arrival: times[n - 1] + ahead.seconds,

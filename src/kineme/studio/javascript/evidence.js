@@ -122,5 +122,6 @@ export function shares(stored, evidence) {
     const end = first[c + 1] ?? m;
     return logSumExp(evidence.subarray(begin * G, end * G)) - Math.log(((end - begin) * G) / numbers.explaining);
   });
-  return softmax(Float64Array.from([...logs, numbers.log_unknown], (log) => numbers.temper * log));
+  const unknown = Math.min(numbers.log_unknown, Math.max(...logs) + 600 / numbers.temper); // no share is 0
+  return softmax(Float64Array.from([...logs, unknown], (log) => numbers.temper * log));
 }

@@ -5,16 +5,25 @@ const SHARE = 0.1; // of its usual step: closer samples are averaged before a sp
 const QUANTILE = 0.75; // of the gaps: the usual step
 const TIME_SHARE = 1e-3; // of the arc-length phase, which keeps it rising through pauses
 const MIN_SAMPLES = 4;
+const JUMP = 0.75; // of a period: a step at least this long is a wrap, and no motion
 const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
-/** A movement, checked: positions are T samples of d numbers, or all of these in a row. @returns {TimedPositions} */
-export function movement(times, positions, d) {
-  const rows = Array.from(positions, (row) => (typeof row === "number" ? row : [...row]));
-  const flat = Float64Array.from(rows.flat());
-  const t = Float64Array.from(times);
+const number = (x) => (typeof x === "number" ? x : NaN);
+
+/**
+ * A movement, checked: positions are T samples of d numbers, or all of these in a row. Angles of the columns of a library
+ * lose the jumps where they wrap. @returns {TimedPositions}
+ */
+export function movement(times, positions, d, columns = null) {
+  /** @type {any[]} */
+  const rows = Array.from(positions, (row) => (row?.length ? [...row] : row));
+  const flat = Float64Array.from(rows.flat(), number);
+  const t = Float64Array.from(times, number);
   if (t.length < MIN_SAMPLES) throw new Error(`expected at least ${MIN_SAMPLES} samples, got ${t.length}; draw longer`);
-  if (flat.length !== t.length * d) {
-    throw new Error(`expected ${t.length} samples of ${d} numbers, got ${flat.length} numbers; give one of each`);
+  const inRows = rows.length === flat.length || rows.every((row) => row?.length === d);
+  if (!inRows || flat.length !== t.length * d) {
+    const got = `${rows.length} of ${rows[0]?.length ?? 1}`;
+    throw new Error(`expected ${t.length} samples of ${d} numbers, got ${got}; give one of each`);
   }
   if (!flat.every((x) => Math.abs(x) <= LARGEST) || !t.every((x) => Math.abs(x) <= Math.sqrt(LARGEST))) {
     throw new Error("expected finite positions up to 1e100 and times up to 1e50 s, got others; leave them out");
@@ -22,6 +31,14 @@ export function movement(times, positions, d) {
   for (let k = 1; k < t.length; k++) {
     if (!(t[k] > t[k - 1])) throw new Error(`expected rising times, got ${t[k - 1]}, ${t[k]} at ${k}; sort them`);
   }
+  columns?.forEach(({ period }, k) => {
+    for (let j = k, turns = 0, last = flat[k]; period && j < flat.length; j += d) {
+      const step = flat[j] - last;
+      last = flat[j];
+      turns += Math.sign(step) * Math.floor(Math.abs(step) / period + 1 - JUMP);
+      flat[j] -= period * turns;
+    }
+  });
   return { times: t, positions: flat, d };
 }
 

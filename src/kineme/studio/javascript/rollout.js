@@ -130,6 +130,7 @@ function cachedDecoder(how, formulation, n) {
 
 /** The primitive of class c, in the formulation of the library or in another one. @returns {Primitive} */
 export function primitiveOf({ header, arrays }, c, formulation = header.movements.formulation) {
+  if (c < 0) throw new Error(`expected one of ${header.classes.join(", ")}, got another name`);
   const how = header.movements;
   const d = how.n_dims;
   const part = (name, size) => arrays[name].subarray(c * size, (c + 1) * size);
@@ -207,6 +208,11 @@ export function rollout({ header, arrays }, primitive, wish = {}) {
     endVelocity,
     samples = how.n_points,
   } = wish;
+  for (const point of [start, goal, ...via.map(([, point]) => point)]) {
+    if (point?.length !== primitive.start.length || !point.every(Number.isFinite))
+      throw new Error(`expected ${primitive.start.length} finite numbers for start, goal and via points, got ${point}`);
+  }
+  if (!(Number.isFinite(duration) && duration > 0)) throw new Error(`expected a duration above 0 s, got ${duration}`);
   const amplitude = goal.map((g, k) => g - start[k]);
   const learned = primitive.goal.map((g, k) => g - primitive.start[k]);
   const ratio = FORMULATIONS[primitive.formulation].ratio(amplitude, learned, primitive.extents);

@@ -11,7 +11,7 @@ import { encode, FORMULATIONS, inFormulation, primitiveOf, rollout } from "./rol
 export function open(text) {
   const snapshot = unpack(text);
   const { header } = snapshot;
-  const d = header.comparison.n_dims;
+  const read = (times, positions) => movement(times, positions, header.comparison.n_dims, header.columns);
   let recognizer = null;
   let begun = null;
   const all = () => (recognizer ??= knownClasses(snapshot));
@@ -21,13 +21,13 @@ export function open(text) {
     classes: header.classes,
     formulations: header.movements.encodes ? Object.keys(FORMULATIONS) : [header.movements.formulation],
     /** The answer to a movement: times [s], positions of d numbers each. */
-    recognize: (times, positions, errorRate) => recognize(all(), movement(times, positions, d), errorRate),
+    recognize: (times, positions, errorRate) => recognize(all(), read(times, positions), errorRate),
     /** What recognizes. */
     recognizer: all,
     /** A function that is given all samples so far, again and again, and says what they begin to be. */
     follow: (options) => follow(beginnings(), options),
     /** Learn a movement. */
-    encode: (times, positions) => encode(snapshot, movement(times, positions, d)),
+    encode: (times, positions) => encode(snapshot, read(times, positions)),
     /** The primitive of a class by its name, or one that was learned, in another formulation if one is named. */
     primitive: (what, formulation) =>
       typeof what === "string"

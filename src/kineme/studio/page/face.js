@@ -234,7 +234,8 @@ function play() {
 
 function save() {
   const { moving } = state;
-  const head = ["t [s]", ..."xyz".slice(0, d)].join(",");
+  const columns = header.columns?.map(({ head }) => head) ?? [..."xyz"].slice(0, d);
+  const head = ["t [s]", ...columns].map((text) => `"${text.replaceAll('"', '""')}"`).join(",");
   const rows = moving.positions.map((x, i) => [moving.times[i], ...x].map((value) => value.toPrecision(9)).join(","));
   handOver(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }), "movement.csv");
 }

@@ -231,7 +231,7 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
 def _way(displacement: list[float] | None, learned: Learned, positions: list[int], path: Array) -> list[float] | None:
     """Return the way of the positions; what moves beside them must move as along the path (T, columns) shown."""
     names = learned.moving_columns
-    if displacement is None or len(displacement) != len(names) or len(positions) == len(names):
+    if displacement is None or len(displacement) != len(names):
         return displacement
     moved = [learned.columns[k] for k in positions]
     shown = dict(zip(learned.columns, path[-1] - path[0], strict=True))

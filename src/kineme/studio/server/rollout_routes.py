@@ -11,7 +11,15 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field, model_validator
 
-from kineme.dmp.generation.generate import Generated, Learned, MovementOptions, generate, learn_one
+from kineme.dmp.generation.generate import (
+    Generated,
+    Learned,
+    MovementOptions,
+    checked_point,
+    generate,
+    in_turn,
+    learn_one,
+)
 from kineme.dmp.styles.model import StyleModel, learn_styles
 from kineme.errors import SpecificationError, heard_warnings
 from kineme.io.writing.write_movement import WRITERS, encode_movement
@@ -51,15 +59,29 @@ def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
         raise SpecificationError(
             f"expected at most {_MOST_SAMPLES:,} samples, got {rate:g} per second for {duration:g} s; take a lower rate"
         )
+    points, notes = _points(learned, body)
     options = MovementOptions(
-        start=None if body.start is None else np.array(body.start),
-        goal=None if body.goal is None else np.array(body.goal),
+        start=points["start"],
+        goal=points["goal"],
         duration=body.duration,
         rate=rate,
         meet_goal=True,  # it ends where the hand put it
         via=tuple((share, np.array(point)) for share, point in sorted(body.via, key=lambda pair: pair[0])),
     )
-    return _around(learned, options, body.obstacles)
+    movement, warnings = _around(learned, options, body.obstacles)
+    return movement, notes + warnings
+
+
+def _points(learned: Learned, body: RolloutRequest) -> tuple[dict[str, Array | None], list[str]]:
+    """Start and goal, angles in the turn of the recording unless they are wanted as they are, and what is turned."""
+    points, notes = dict[str, Array | None](), list[str]()
+    for name, given in (("start", body.start), ("goal", body.goal)):
+        points[name] = None if given is None else np.array(given)
+        checked_point(learned, points[name], name)
+        if body.in_turn:
+            points[name], said = in_turn(learned, points[name], name)
+            notes += said
+    return points, notes
 
 
 def name_of(studio: Studio, what: Subject) -> str:
@@ -215,6 +237,9 @@ class RolloutRequest(PrimitiveRequest):
     obstacles: list[Obstacle] = Field([], max_length=100)
     duration: records.Number | None = Field(None, gt=0, description="[s]")
     rate: records.Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
+    in_turn: bool = Field(
+        True, description="Angles of start and goal are taken in the turn of the recording, which a warning says."
+    )
 
 
 class ExportRequest(RolloutRequest):
@@ -269,13 +294,13 @@ def rollout(studio: Reads, body: RolloutRequest) -> dict[str, Any]:
     """
     (movement, warnings), learned = make(studio, body), learned_as(studio, body)
     columns, recording = movement.columns, learned.demonstration
-    positions = moving_positions(learned, movement)
+    positions, goal = moving_positions(learned, movement), _points(learned, body)[0]["goal"]
     return {
         **{name: records.numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
         "positions": records.numbers(positions),
         "columns": list(learned.moving_columns),
         "start": records.numbers(positions[0]),
-        "goal": records.numbers(positions[-1] if body.goal is None else body.goal),
+        "goal": records.numbers(positions[-1] if goal is None else goal),
         "recorded": None if recording is None else records.thumbnail(recording.positions),
         "warnings": warnings,
     }

@@ -51,5 +51,5 @@ export function question(plan, formulation) {
   const { start, goal, usual, share, obstacles } = plan;
   const via = plan.via.toSorted((a, b) => a.at - b.at).map(({ at, point }) => [at, point]);
   const past = { ...(via.length && { via }), ...(obstacles.length && { obstacles }) };
-  return { what: what(plan), formulation, start, goal, duration: usual * share, ...past };
+  return { what: what(plan), formulation, start, goal, in_turn: false, duration: usual * share, ...past };
 }
