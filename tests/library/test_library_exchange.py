@@ -109,6 +109,16 @@ def test_a_library_in_use_is_not_taken_for_an_export(tmp_path):
         assert len(copy) == 3
 
 
+def test_a_copy_of_the_file_alone_holds_what_an_open_library_has_committed(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(3))
+        library.delete([1])
+        (tmp_path / "backup").mkdir()
+        (tmp_path / "backup" / FILE).write_bytes((tmp_path / "actions" / FILE).read_bytes())
+        with ActionLibrary(tmp_path / "backup") as backup:
+            assert contents(backup) == contents(library)
+
+
 def test_what_a_killed_export_left_is_deleted_by_one_of_another_day(eventful, tmp_path):
     with ActionLibrary(eventful) as library:
         library.export(tmp_path / "one")

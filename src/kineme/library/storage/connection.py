@@ -90,6 +90,8 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
         if mode != "ro":
             connection.execute(f"PRAGMA cache_size = -{_WRITER_CACHE_KIB}")
             connection.execute(f"PRAGMA journal_size_limit = {_LOG_BYTES}")
+            # After every commit, so that the file is complete if somebody copies it alone.
+            connection.execute("PRAGMA wal_autocheckpoint = 1")
     except BaseException:
         connection.close()
         raise
