@@ -402,7 +402,8 @@ class ActionLibrary:
 
         All that one call of `learn` stored is one change, unless somebody else changed the library meanwhile. Called
         again, it takes back the change before. Symbols get their ids again; a movement that was deleted, or of which
-        it was said since who showed it, gets a new id, as if it were learned again.
+        it was said since who showed it, gets a new id, as if it were learned again. The library keeps the columns and
+        the dimensions of its first movements, which can be restored, also where it is empty then.
 
         Parameters
         ----------
