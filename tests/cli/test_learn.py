@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from unicodedata import normalize
 
 import numpy as np
 import pytest
@@ -38,6 +39,14 @@ def test_a_folder_of_folders_becomes_symbols(recordings, demos, tmp_path):
         again = by_name[f"GShape/{i}.csv"]
         np.testing.assert_allclose(again.positions, one.positions, atol=1e-5)  # single precision, mm
         np.testing.assert_allclose(again.times, one.times, atol=1e-6)
+
+
+def test_folders_whose_names_look_the_same_are_one_symbol(recordings, tmp_path):
+    """As of two file systems, one of which decomposes names."""
+    for name, form in (("CShape", "NFC"), ("GShape", "NFD")):
+        (recordings / name).rename(recordings / normalize(form, "café"))
+    learned = answer("learn", recordings, "-l", tmp_path / "actions")
+    assert (learned["added"], learned["symbols"], learned["kept"]) == (14, [normalize("NFC", "café")], [])
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,18 @@ def test_processes_answer_as_shards_do(work, tmp_path):
     assert answer(*command, "-o", tmp_path / "workers", "--shard", "1/1")["pieces"] == {"skipped": 3}
 
 
+def test_a_version_that_another_one_has_replaced_makes_its_parts_stale(work, tmp_path):
+    """A backup is put back, and the next version gets the number of the one that it discarded."""
+    command = ("annotate", work / "archive" / "set 0", "-l", tmp_path / "actions", "-o", tmp_path / "out")
+    for name in ("first", "second"):
+        shutil.rmtree(tmp_path / "actions", ignore_errors=True)
+        shutil.copytree(work / "actions", tmp_path / "actions")
+        assert run("library", "rename", "tap", name, "-l", tmp_path / "actions").returncode == 0
+        assert answer(*command, "--shard", "1/1")["pieces"] == {"done": 1}
+    run("gather", tmp_path / "out", "-o", tmp_path / "gathered.csv")
+    assert "second" in (tmp_path / "gathered.csv").read_text()
+
+
 def test_hits_are_those_of_find(work, tmp_path):
     command = ("find", "tap", work / "archive", "-l", work / "actions")
     run(*command, "-o", tmp_path / "here.csv")

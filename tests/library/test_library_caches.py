@@ -81,6 +81,25 @@ def test_a_cache_of_other_members_is_not_believed_however_many_they_are(tmp_path
         assert answers != before
 
 
+@pytest.mark.parametrize("name", [CALIBRATION, calibration_cache.FILE_OF_ALL])
+def test_a_cache_of_movements_that_a_restored_backup_has_discarded_is_not_believed(tmp_path, monkeypatch, name):
+    """The movements that are learned instead have the same ids, names and versions."""
+    monkeypatch.setattr(calibration_cache, "_FEW", 12)
+    of, answers = 0 if name == CALIBRATION else 12, []
+    ActionLibrary(tmp_path, create=True).close()
+    backup = (tmp_path / "library.sqlite").read_bytes()
+    for seed in (1, 2):
+        (tmp_path / "library.sqlite").write_bytes(backup)
+        with ActionLibrary(tmp_path) as library:
+            library.learn(draw_movements(12, n_samples=12, labels=LABELS[0], seed=seed))
+            answers.append(LibraryRecognizer(library.store, exhaustive=of).current().model.calibration.scales)
+    (tmp_path / name).unlink()
+    with ActionLibrary(tmp_path) as library:
+        expected = LibraryRecognizer(library.store, exhaustive=of).current().model.calibration.scales
+    np.testing.assert_allclose(answers[1], expected, rtol=1e-5)
+    assert (abs(answers[0] - expected) > 1e-3).all()
+
+
 def _header(data, **changes):
     """Codes with another header, and the checksum that fits."""
     header = json.loads(data[: features_cache._HEADER].rstrip(b"\0")) | changes
@@ -231,7 +250,7 @@ def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
     assert len(computed) == 2
 
 
-@pytest.mark.parametrize("change", ["learn", "assign", "delete", "rename", "content"])
+@pytest.mark.parametrize("change", ["learn", "assign", "delete", "rename"])
 def test_a_change_of_the_library_makes_it_again(of_all, tmp_path, change):
     library, computed = of_all
     _all_answers(library)
@@ -243,18 +262,13 @@ def test_a_change_of_the_library_makes_it_again(of_all, tmp_path, change):
     elif change == "delete":
         library.learn(draw_movements(1, n_samples=13, labels=["wave"]))
         library.delete([1])
-    elif change == "rename":
+    else:
         library.rename("nod", "bend")
-    else:  # the same ids and names in another folder, whose samples are others
-        digests = calibration_cache._digests(library.store, members_of(library.store))
-        key = calibration_cache._key(library.store, members_of(library.store), digests)
-        assert key != calibration_cache._key(library.store, members_of(library.store), digests[:-5] + b"7)]]]")
-        return
     (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(cached)
     _, fresh = _all_answers(library)
     assert len(computed) == 2
     (tmp_path / calibration_cache.FILE_OF_ALL).unlink()
-    np.testing.assert_array_equal(_all_answers(library)[1].scales, fresh.scales)
+    np.testing.assert_allclose(_all_answers(library)[1].scales, fresh.scales, rtol=1e-6)  # single precision, as above
 
 
 def test_a_hostile_calibration_of_all_is_made_again(of_all, tmp_path):
@@ -262,7 +276,7 @@ def test_a_hostile_calibration_of_all_is_made_again(of_all, tmp_path):
     expected, _ = _all_expected(library)
     path = tmp_path / calibration_cache.FILE_OF_ALL
     cached, members = path.read_bytes(), members_of(library.store)
-    key = calibration_cache._key(library.store, members, calibration_cache._digests(library.store, members))
+    key = calibration_cache._key(library.store, members)
     for changes in ({"novel own": np.full(12, -1.0)}, {"novel ends": np.array([0, 99, 12])}, {"novel own": None}):
         path.write_bytes(_archive(**changes)(cached, key))
         assert _all_answers(library)[0] == expected

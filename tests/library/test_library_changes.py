@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unicodedata import normalize
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +13,8 @@ from library_samples import contents, draw_movements
 import kineme
 from kineme import ActionLibrary
 from kineme.errors import SpecificationError
-from kineme.library.storage import symbols
+from kineme.library.annotate import check_symbols
+from kineme.library.storage import changes, symbols
 
 N = 12
 NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é", "\n\t", "$(reboot)", "%s", "名"]
@@ -159,11 +162,35 @@ TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")
 
 
 @given(names=st.lists(TEXT, min_size=30, max_size=30))
-def test_names_come_back_as_they_were_given(tmp_path_factory, names):
+def test_names_come_back_as_they_were_given_but_composed(tmp_path_factory, names):
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(draw_movements(30, n_samples=8), labels=names)
+        names = [normalize("NFC", name) for name in names]
         assert {symbol.name for symbol in library.symbols()} == set(names)
         assert [library.movements(ids=[i + 1])[0].label for i in range(30)] == names
+
+
+def test_one_name_in_two_forms_of_unicode_is_one_symbol(library):
+    """File systems of Apple decompose names of folders, which are labels."""
+    composed, decomposed = (normalize(form, "café") for form in ("NFC", "NFD"))
+    library.rename("wave", decomposed)
+    library.learn(draw_movements(2, seed=9), labels=[composed, decomposed], groups=[composed, decomposed])
+    assert [symbol.name for symbol in library.symbols()] == ["bow", composed, "nod"]
+    assert library.groups().tolist()[-2:] == [composed] * 2
+    assert library[decomposed].id == library[composed].id
+    assert check_symbols(library.store, [decomposed]) == [composed]
+
+
+def test_a_decomposed_name_of_an_earlier_library_is_found(library, monkeypatch):
+    composed, decomposed = (normalize(form, "café") for form in ("NFC", "NFD"))
+    with monkeypatch.context() as earlier:
+        earlier.setattr(changes, "check_name", str)
+        library.rename("wave", decomposed)
+    assert library[composed].name == decomposed
+    assert library.learn(draw_movements(1, seed=9), labels=[composed]).symbols == ()
+    assert check_symbols(library.store, [composed]) == [decomposed]
+    library.rename(composed, composed)
+    assert library[decomposed].name == composed
 
 
 def test_merging_and_splitting_record_where_symbols_come_from(library):

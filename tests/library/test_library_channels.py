@@ -208,6 +208,8 @@ def test_a_library_says_what_it_was_recorded_as_and_refuses_other_kinds(library)
     walks = Demonstrations.from_arrays(np.cumsum(np.random.default_rng(0).normal(size=(2, 30, 6)), axis=1))
     with pytest.raises(TrajectoryError, match=r"expected movements recorded as gripper \(disc.* got j0 \(position\)"):
         library.recognize(Demonstrations.of_movements(of_channels(walks.movements, plain)))
+    with pytest.raises(TrajectoryError, match=r"expected .* of the library in .*, or make another library$"):
+        library.learn(Demonstrations.of_movements(of_channels(walks.movements, plain)))
 
 
 def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_of_the_library(library):

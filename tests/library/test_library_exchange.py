@@ -109,6 +109,30 @@ def test_a_library_in_use_is_not_taken_for_an_export(tmp_path):
         assert len(copy) == 3
 
 
+def test_a_linked_library_is_read_with_the_log_beside_its_file(tmp_path, monkeypatch):
+    """Where the folder is read-only, a file without a log is taken for one that does not change."""
+    (tmp_path / "link").mkdir()
+    (tmp_path / "link" / FILE).symlink_to(tmp_path / "actions" / FILE)
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(3))
+        monkeypatch.setattr(os, "access", lambda *_, **__: False)
+        with ActionLibrary(tmp_path / "link", read_only=True) as linked:
+            library.learn(draw_movements(6))
+            assert len(linked) == len(library) == 6
+        with pytest.raises(DataError, match=f"with changes beside it in {FILE}-wal; export it"):
+            ActionLibrary.import_(tmp_path / "link" / FILE, tmp_path / "copy")
+
+
+def test_a_copy_of_the_file_alone_holds_what_an_open_library_has_committed(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(3))
+        library.delete([1])
+        (tmp_path / "backup").mkdir()
+        (tmp_path / "backup" / FILE).write_bytes((tmp_path / "actions" / FILE).read_bytes())
+        with ActionLibrary(tmp_path / "backup") as backup:
+            assert contents(backup) == contents(library)
+
+
 def test_what_a_killed_export_left_is_deleted_by_one_of_another_day(eventful, tmp_path):
     with ActionLibrary(eventful) as library:
         library.export(tmp_path / "one")

@@ -58,6 +58,7 @@ CHANGES = {
     "assign to a new one": lambda library: library.assign([1, 2, 3], "new"),
     "release": lambda library: library.release([1, 2]),
     "learn": lambda library: library.learn(draw_movements(3, 2, 9), ["wave", "other", None]),
+    "say who showed": lambda library: library.learn(draw_movements(12, 2, 3), groups=["Bob"] * 12),
 }
 
 
@@ -186,9 +187,18 @@ def test_a_proposal_that_was_accepted_is_one_change(library):
     assert _state(library) == _state(library.at(version))
 
 
+def test_who_showed_movements_is_corrected_by_saying_it_again_after_an_undo(library):
+    CHANGES["say who showed"](library)
+    library.undo()
+    library.learn(draw_movements(12, 2, 3), groups=["Cleo"] * 12)
+    assert library.groups().tolist().count("Cleo") == 6
+    assert len(library) == 12
+    assert library.verify() == []
+
+
 def test_an_empty_library_says_why_it_keeps_its_dimensions(library):
     library.undo(to=0)
-    with pytest.raises(TrajectoryError, match="2 dimensions as those of earlier versions, which can be restored"):
+    with pytest.raises(TrajectoryError, match=r"2 dimensions as those of earlier versions, .*, or make another"):
         library.learn(draw_movements(2, 3))
     assert library.learn(draw_movements(2)).added == 2
 
@@ -201,15 +211,15 @@ def test_the_past_and_libraries_open_for_reading_undo_nothing(library):
 
 def test_every_version_is_restored_and_an_undo_takes_that_back(library):
     states = [{}, _state(library)]
-    for name in ("annotate", "merge", "delete movements", "learn"):
+    for name in ("annotate", "say who showed", "merge", "delete movements", "learn"):
         CHANGES[name](library)
         states.append(_state(library))
-    for to in (2, 3, 0, 4):
+    for to in (2, 3, 4, 0, 5):
         last = library.version
         assert library.undo(last, to=to) == (last + 1, to, "restore")
         assert _state(library) == states[to]
         library.undo()
-        assert _state(library) == states[5]
+        assert _state(library) == states[6]
     assert library.verify() == []
 
 

@@ -47,11 +47,10 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str
 
     as_json, force, error_rate, output = (options.pop(name) for name in ("as_json", "force", "error_rate", "output"))
     how = how_divided(options, recordings)
-    symbols = (symbol, *also)
     if how is not None:
         with opts.opened(folder) as library:
-            search.check_symbols(library.store, symbols)
-        asked = {"reading": options, "error_rate": error_rate, "symbols": list(symbols)}
+            symbols = search.check_symbols(library.store, (symbol, *also))
+        asked = {"reading": options, "error_rate": error_rate, "symbols": symbols}
         in_pieces("find", recordings, output, how, asked, folder, force=force, as_json=as_json)
         return
     check_new(output, force, *recordings)
@@ -59,7 +58,7 @@ def find(symbol: str, recordings: tuple[Path, ...], folder: Any, also: tuple[str
     if writer is not None and not writer.several:
         raise click.UsageError(f"expected a table to write, .csv or .json, got {printable(output)}")
     with opts.opened(folder) as library:
-        search.check_symbols(library.store, symbols)
+        symbols = search.check_symbols(library.store, (symbol, *also))
         with progress(desc="searching", unit=" s of recordings", bar_format="{l_bar}{n:.0f}{unit} [{elapsed}]") as bar:
             occurrences = search.find(
                 library.store,

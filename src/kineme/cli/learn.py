@@ -170,12 +170,13 @@ def joined_since(library: Any, before: int) -> int:
 def named_of(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
     """Count movements without symbol, and the labels that were not taken since a movement has another symbol."""
     from kineme.library.storage.read import names_of
+    from kineme.library.storage.symbols import spellings
 
     names = names_of(library.store, ids)
     refused = Counter(
         (symbol, label)
         for symbol, label in zip(names, labels, strict=True)
-        if symbol is not None and label is not None and symbol != label
+        if symbol is not None and label is not None and symbol not in spellings(str(label))
     )
     return {
         "without_symbol": sum(name is None for name in names),

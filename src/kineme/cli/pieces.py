@@ -154,7 +154,9 @@ def _of_library(folder: Any, task: str, output: Path, force: bool) -> dict[str, 
         if task == "features":
             bases = shared_reduction(output, library.store, renew=force).digest
             return said | {"library_id": library.store.id, "bases": bases, "shards": str(output.absolute())}
-        return said | {"library_id": library.store.id, "library_version": library.version}
+        # The time, too: where a backup is put back, another version gets the same number.
+        version = max(([version.id, version.at] for version in library.history()), default=[0, ""])
+        return said | {"library_id": library.store.id, "library_version": version}
 
 
 def _text(data: dict[str, Any], summary: str) -> str:

@@ -12,6 +12,7 @@ from kineme.io.writing.annotations import Annotation
 from kineme.library.members import members_of
 from kineme.library.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
+from kineme.library.storage.symbols import spellings
 from kineme.recognition.answer import KnownClasses
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.spotting import spot
@@ -115,15 +116,17 @@ def find(
     return Occurrences(hits, n, seconds, problems, bool(classes.calibration.calibrated(error_rate).all()))
 
 
-def check_symbols(store: Store, symbols: Collection[str]) -> None:
-    """Refuse names that no symbol of a library has, and say which are near."""
+def check_symbols(store: Store, symbols: Collection[str]) -> list[str]:
+    """Return names as the library has them; refuse those that no symbol has, and say which are near."""
     from difflib import get_close_matches
 
     names = list(members_of(store).names)
+    known = {text: name for name in names for text in spellings(name)} | dict(zip(names, names, strict=True))
     for symbol in symbols:
-        if symbol not in names:
+        if symbol not in known:
             near = get_close_matches(symbol, names, _SUGGESTED, 0.5) or names
             raise DataError(
                 f"expected a symbol of the library {store.folder}, got {symbol!r}; there are "
                 f"{first_names(near, _SUGGESTED)}"
             )
+    return [known[symbol] for symbol in symbols]

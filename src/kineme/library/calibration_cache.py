@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.library.members import Members, described_references
-from kineme.library.storage.rows import among, listed
 from kineme.library.storage.store import Store
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.two_stage_search import calibrate_sample
@@ -44,9 +43,7 @@ def sample_comparison(store: Store, members: Members) -> Comparison:
 
 def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """Return the calibration on all members, taken from the cache if that is of the same ones."""
-    return _cached(
-        store, FILE, _key(store, members), members, lambda: calibrate_sample(similarity, stored, members.groups)
-    )
+    return _cached(store, FILE, members, lambda: calibrate_sample(similarity, stored, members.groups))
 
 
 def calibrated_once(
@@ -60,13 +57,12 @@ def calibrated_once(
     """Return `conformal.calibrate` of the members, from a cache of its own; of few, it is computed every time."""
     if len(members.ids) < _FEW:
         return calibrate(similarity, references, groups, classifier)
-    key = _key(store, members, _digests(store, members))
-    return _cached(store, FILE_OF_ALL, key, members, lambda: calibrate(similarity, references, groups, classifier))
+    return _cached(store, FILE_OF_ALL, members, lambda: calibrate(similarity, references, groups, classifier))
 
 
-def _cached(store: Store, name: str, key: str, members: Members, make: Callable[[], Calibration]) -> Calibration:
-    """Return the calibration in that file of the folder, if it has this key; else made, and written there."""
-    path = store.cache_path(name)
+def _cached(store: Store, name: str, members: Members, make: Callable[[], Calibration]) -> Calibration:
+    """Return the calibration in that file of the folder, if it is of these members; else made, and written there."""
+    path, key = store.cache_path(name), _key(store, members)
     if path is not None and path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _deserialized(path.read_bytes(), key, len(members.names))
@@ -77,19 +73,19 @@ def _cached(store: Store, name: str, key: str, members: Members, make: Callable[
     return calibration
 
 
-def _digests(store: Store, members: Members) -> bytes:
+def _key(store: Store, members: Members) -> str:
+    """Cache validity key: changes with the library, its specification, members and people.
+
+    Ids are never reused, but a backup that is put back may give them to other movements. When the last member was
+    stored tells these apart, and with it all earlier ones.
+    """
     with store.reading() as connection:
-        query = f"SELECT digest FROM movement WHERE {among('id')} ORDER BY id"
-        return repr(connection.execute(query, {"keys": listed(members.ids)}).fetchall()).encode()
-
-
-def _key(store: Store, members: Members, content: bytes = b"") -> str:
-    """Cache validity key: changes with the library, its specification, members and people, and with `content`."""
-    text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
+        query = "SELECT at FROM version WHERE id = (SELECT added FROM movement WHERE id = :last)"
+        at = connection.execute(query, {"last": int(members.ids.max())}).fetchall()
+    text = [_FORMAT, store.id, str(at), *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
     digest.update(b"" if members.groups is None else members.groups.tobytes())
-    digest.update(content)
     return digest.hexdigest()
 
 

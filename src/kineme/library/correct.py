@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
+from unicodedata import normalize
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from kineme.library.storage import changes as storage
 from kineme.library.storage.read import names_of
 from kineme.library.storage.rows import among, listed, select
 from kineme.library.storage.store import Store
+from kineme.library.storage.symbols import spellings
 from kineme.movements.episodes import place_of
 from kineme.reporting.text import printable
 
@@ -143,7 +145,9 @@ def _as_annotated(new: Stretch, near: Stretch | None, symbols: Collection[str]) 
     """Return a stretch with the symbol that was annotated, in whatever way its file writes that: first the near one."""
     row, was = new.row, None if near is None else near.row.label
     others = () if row.label is None or row.label in symbols else symbols
-    symbol = next((name for name in (was, *others) if name is not None and row.text in _written(name)), row.label)
+    texts = {*spellings(row.text)}
+    new_name = None if row.label is None else normalize("NFC", row.label)
+    symbol = next((name for name in (was, *others) if name is not None and texts & _written(name)), new_name)
     return new._replace(row=row._replace(label=symbol))
 
 

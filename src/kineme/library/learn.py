@@ -195,7 +195,8 @@ def check_channels(store: Store, demos: Demonstrations) -> None:
         return
     raise TrajectoryError(
         f"expected movements recorded as {in_words(ours)}, as {_others(store)} of the library in {store.folder}, got "
-        f"{in_words(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
+        f"{in_words(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind, "
+        "or make another library"
     )
 
 

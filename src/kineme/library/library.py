@@ -401,8 +401,9 @@ class ActionLibrary:
         """Take back the last change that was not taken back yet, whoever made it, or restore a version, as a new one.
 
         All that one call of `learn` stored is one change, unless somebody else changed the library meanwhile. Called
-        again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
-        new id, as if it were learned again. Who showed a movement, and its number of dimensions, stay known.
+        again, it takes back the change before. Symbols get their ids again; a movement that was deleted, or of which
+        it was said since who showed it, gets a new id, as if it were learned again. The library keeps the columns and
+        the dimensions of its first movements, which can be restored, also where it is empty then.
 
         Parameters
         ----------

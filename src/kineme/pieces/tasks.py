@@ -41,9 +41,14 @@ class Learned(NamedTuple):
 
 
 @lru_cache(maxsize=1)
-def learned_at(folder: str, version: int) -> Learned:
-    """Return the symbols of a library as they were at a version, whatever is learned meanwhile."""
+def learned_at(folder: str, version: int, at: str) -> Learned:
+    """Return the symbols of a library as they were at a version, made at that time, whatever is learned meanwhile."""
     with ActionLibrary(folder, read_only=True) as library, library.at(version) as past:
+        if any(last.at != at for last in past.history()[-1:]):
+            raise DataError(
+                f"expected version {version} of {folder} that was made at {at}, got another one, as of a backup that "
+                "was put back; run the command again"
+            )
         return Learned(some_of_each_symbol(past.store), known_sources(past.store))
 
 
@@ -51,7 +56,7 @@ def annotated(source: Source, options: Options) -> Iterator[Any]:
     """Yield a row for each stretch of motion, as `kineme annotate` finds it."""
     import pyarrow as pa
 
-    learned = learned_at(options["library"], options["library_version"])
+    learned = learned_at(options["library"], *options["library_version"])
     for recordings in recordings_of(source, options["reading"], learned.known):
         try:
             report = annotate_by(learned.classes, recordings, options["error_rate"])

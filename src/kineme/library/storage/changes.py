@@ -22,7 +22,7 @@ _SAID = ("description", "prototype", "threshold")  # the columns that `annotate`
 @repeated
 def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
-    check_name(new)
+    new = check_name(new)
     with store.writing("rename") as change:
         state = state_of(change.connection, old, NOW)
         change.detail.update(old=state[_NAME], new=new)
@@ -91,14 +91,14 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
     with store.writing("merge") as change:
         states = {state[1]: state for state in (state_of(change.connection, name, NOW) for name in names)}
         target = _find(change.connection, into)
+        into = check_name(into) if target is None else target[_NAME]
         merged_names = [state[_NAME] for state in states.values()]
-        change.detail.update(names=merged_names, into=into if target is None else target[_NAME])
+        change.detail.update(names=merged_names, into=into)
         merged = [state for key, state in states.items() if target is None or key != target[1]]
         if not merged:
             raise SpecificationError(f"expected symbols other than {into!r} to merge into it, got {list(names)}")
         parents = _ids_of(change.connection, merged)
         if target is None:
-            check_name(into)
             key = make(change, into, parents)
         else:
             key = target[1]
@@ -114,7 +114,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
 @repeated
 def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
-    check_name(new)
+    new = check_name(new)
     wanted = as_ids(store, ids)
     with store.writing("split") as change:
         state = state_of(change.connection, name, NOW)
@@ -153,9 +153,10 @@ def assign(  # noqa: PLR0913, PLR0917 - what a symbol gets
         values["description"] = description
     with store.writing("assign") as change:
         state = _find(change.connection, who)
-        change.detail.update(symbol=who if state is None else state[_NAME], movements=len(wanted), how=how, **values)
+        who = check_name(who) if state is None else state[_NAME]
+        change.detail.update(symbol=who, movements=len(wanted), how=how, **values)
         continue_from(change, continues)
-        key = make(change, check_name(who)) if state is None else state[1]
+        key = make(change, who) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])
         add_members(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)

@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from kineme.errors import DataError, KinemeError
 from kineme.library.storage.rows import Database, Row, damage, insert, select
-from kineme.library.storage.safety import Connection, defend, open_connection
+from kineme.library.storage.safety import Connection, defend, file_of, open_connection
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 from kineme.reporting.atomic import OF_SQLITE, remove_leftovers, whole_file
 
@@ -72,6 +72,7 @@ _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY typ
 
 def connect(path: Path, mode: str, wait: float) -> Connection:
     """Return a connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
+    path = file_of(path)
     address = f"file:{quote(os.fsencode(path))}?mode={mode}"
     # Where the folder is read-only for this user and has no log, SQLite cannot lock, and reads without. It then assumes
     # that the file does not change: if another user writes to it meanwhile, rows are refused as damaged until the
@@ -90,6 +91,8 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
         if mode != "ro":
             connection.execute(f"PRAGMA cache_size = -{_WRITER_CACHE_KIB}")
             connection.execute(f"PRAGMA journal_size_limit = {_LOG_BYTES}")
+            # After every commit, so that the file is complete if somebody copies it alone.
+            connection.execute("PRAGMA wal_autocheckpoint = 1")
     except BaseException:
         connection.close()
         raise
@@ -120,13 +123,19 @@ def define(connection: sqlite3.Connection, meta: dict[str, str]) -> None:
 
 def check_alone(path: Path) -> None:
     """Refuse to create a library beside the log of a deleted one: SQLite would apply that log to the new one."""
-    logs = [path.with_name(path.name + end) for end in LOGS]
-    left = [log for log in logs if log.exists() and log.stat().st_size]
+    left = logs_of(path)
     if left and not path.exists():  # in this order: the log of a library that is created now appears after it
         raise DataError(
             f"expected no log without its library, found {left[0]} and no {path.name}; put the library back, or delete "
             "the log, which is of no use without it"
         )
+
+
+def logs_of(path: Path) -> list[Path]:
+    """Return the logs with changes of a database."""
+    file = file_of(path)
+    logs = [file.with_name(file.name + end) for end in LOGS]
+    return [log for log in logs if log.exists() and log.stat().st_size]
 
 
 def check_kind(connection: sqlite3.Connection, path: Path) -> int:

@@ -62,12 +62,11 @@ def import_(path: str | Path, folder: str | Path | Address, wait: float = 10.0) 
     if not source.is_file():
         got = "something else" if source.exists() else "no file"
         raise DataError(f"expected an exported library at {source}, found {got} there")
-    for log in (source.with_name(source.name + end) for end in sqlite.LOGS):
-        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
-            raise DataError(
-                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
-                "import that file"
-            )
+    if logs := sqlite.logs_of(source):  # they contain changes; the file alone is an older state
+        raise DataError(
+            f"expected an exported library, got {source} with changes beside it in {logs[0].name}; export it, and "
+            "import that file"
+        )
     location.mkdir(parents=True, exist_ok=True)
     sqlite.check_alone(target)
     with _new(target) as beside:

@@ -13,6 +13,7 @@ reads or writes, all connections are closed, and both sides open them again when
 from __future__ import annotations
 
 import ctypes
+import os
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
@@ -40,7 +41,13 @@ _ON = ("SQLITE_DBCONFIG_DEFENSIVE",)
 
 def size_of(path: Path) -> int:
     """Return bytes of a database and of its log."""
+    path = file_of(path)
     return sum(file.stat().st_size for file in (path, path.with_name(path.name + "-wal")) if file.exists())
+
+
+def file_of(path: Path) -> Path:
+    """Return the file that a path leads to: logs lie beside it, not beside a link; a link to itself is none."""
+    return Path(os.path.realpath(path))
 
 
 def defend(connection: sqlite3.Connection) -> None:

@@ -8,6 +8,7 @@ import secrets
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,10 +82,12 @@ def exists(store: Store, who: object) -> bool:
 
 def state_of(connection: sql.Database, who: str, version: int) -> sql.Row:
     """Return the row of `symbol_state` of a name or, where no symbol has that name, of an id."""
-    conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
-    for condition in conditions if isinstance(who, str) else ():
+    spelled = spellings(who) if isinstance(who, str) else ()
+    conditions = [("name = :who", name) for name in spelled]
+    conditions += [("symbol IN (SELECT key FROM symbol WHERE id = :who)", name) for name in spelled[:1]]
+    for condition, name in conditions:
         try:
-            states = sql.select(connection, "symbol_state", f"{condition} AND {sql.ALIVE}", {"who": who, "v": version})
+            states = sql.select(connection, "symbol_state", f"{condition} AND {sql.ALIVE}", {"who": name, "v": version})
         except UnicodeEncodeError:
             break
         if states:
@@ -125,13 +128,22 @@ def _members(connection: sql.Database, keys: list[int], moment: Moment) -> dict[
 
 
 def check_name(name: Any) -> str:
-    """Check a name: any Unicode text without U+0000, which NumPy, C and shells treat as the end of a text."""
+    """Return a name in its composed form (NFC), so that one that looks the same is the same.
+
+    It is any Unicode text without U+0000, which NumPy, C and shells treat as the end of a text.
+    """
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
+    name = normalize("NFC", name)
     sql.check_text("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
     return name
+
+
+def spellings(name: str) -> tuple[str, ...]:
+    """Return a name as it is given, composed, and decomposed, as some file systems and earlier libraries have it."""
+    return tuple(dict.fromkeys((name, normalize("NFC", name), normalize("NFD", name))))
 
 
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
@@ -147,10 +159,13 @@ def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], 
 def stored_keys(connection: sql.Database, names: Iterable[str]) -> dict[str, int]:
     """Return the name or id -> key of its symbol, of those that there are."""
     alive = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    spelled = {name: spellings(name) for name in names}
+    every = sql.listed({text for texts in spelled.values() for text in texts})
     keys: dict[str, int] = {}
     for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
         query = f"SELECT {column}, symbol.key {alive} AND {sql.among(column)}"
-        keys |= dict(connection.execute(query, {"keys": sql.listed(names)}))
+        there: dict[str, int] = dict(connection.execute(query, {"keys": every}))
+        keys |= {name: there[text] for name, texts in spelled.items() for text in reversed(texts) if text in there}
     return keys
 
 

@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import NamedTuple
 
 from kineme.errors import SpecificationError
+from kineme.library.storage.read import people_by_movement
 from kineme.library.storage.rows import ALIVE, Database, Row, among, has_table, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
 from kineme.library.storage.store import NOW, Change, Store, Version, history, repeated
@@ -99,7 +100,7 @@ def _version(connection: Database, version: int) -> Row:
 
 
 def _return_to(change: Change, version: int) -> None:
-    """Make the rows alive those of an earlier version. A movement that was deleted gets a new id, as learned again."""
+    """Make the rows alive those of an earlier version. One that was deleted gets a new id, as learned again."""
     ids = _return_movements(change, version)
     then, now = (_rows(change, "member", at) for at in (version, NOW))
     wanted = {(ids[row[1]], row[2], row[3]) for row in then}
@@ -120,29 +121,40 @@ def _return_to(change: Change, version: int) -> None:
 
 
 def _return_movements(change: Change, version: int) -> dict[int, int]:
-    """Return the id now of every movement of that version; those that are not there any more are stored again."""
-    then, now = (_rows(change, "movement", at) for at in (version, NOW))
-    alive = {row[_DIGEST]: row[0] for row in now}
-    lost = [row for row in then if row[_DIGEST] not in alive]
-    key = next_key(change.connection, "movement")
-    again = {row[0]: key + k for k, row in enumerate(lost)}
+    """Return the id now of every movement of that version; those that are not there as they were are stored again.
+
+    Who showed a movement is said of its id once and for all, so that one of which that is another now gets a new id.
+    """
+    then, now = (_keyed_rows(change, at) for at in (version, NOW))
+    ids = {key: row[0] for row, key in now}
+    lost = [row for row, key in then if key not in ids]
+    first = next_key(change.connection, "movement")
+    again = {row[0]: first + k for k, row in enumerate(lost)}
     # Movements that were learned later leave the places of the lost ones in their files. What refers to them is of no
     # earlier version, and is retired with all that is not.
-    places = {row[1:3] for row in lost if row[1] is not None}
-    change.retire("movement", [row for row in now if row[1] is not None and row[1:3] in places])
+    places, digests = {row[1:3] for row in lost if row[1] is not None}, {row[_DIGEST] for row in lost}
+    change.retire("movement", [row for row, _ in now if row[1:3] in places or row[_DIGEST] in digests])
     change.insert("movement", [(again[row[0]], *row[1:-2], change.version, None) for row in lost])
     _copy(change, again)
-    return {row[0]: again.get(row[0], alive.get(row[_DIGEST], 0)) for row in then}
+    people = [(again[row[0]], key[1], change.version) for row, key in then if row[0] in again and key[1] is not None]
+    change.insert("shown_by", people)
+    return {row[0]: again.get(row[0]) or ids[key] for row, key in then}
+
+
+def _keyed_rows(change: Change, version: int) -> list[tuple[Row, tuple[int, str | None]]]:
+    """Return the movements of a version, each with its digest and who showed it as far as that was known."""
+    rows = _rows(change, "movement", version)
+    people = people_by_movement(change.connection, [row[0] for row in rows], version)
+    return [(row, (row[_DIGEST], people.get(row[0]))) for row in rows]
 
 
 def _copy(change: Change, again: Mapping[int, int]) -> None:
-    """Copy the samples, primitives, features and people of movements to their new ids."""
+    """Copy the samples, primitives and features of movements to their new ids."""
     keys = {"keys": listed(again)}
-    for table in (*BLOBS, *OPTIONAL_BLOBS, "shown_by"):
+    for table in (*BLOBS, *OPTIONAL_BLOBS):
         if again and has_table(change.connection, table):
             for row in select(change.connection, table, among("movement"), keys):
-                later = (*row[1:-1], change.version) if table == "shown_by" else row[1:]
-                change.insert(table, [(again[row[0]], *later)])
+                change.insert(table, [(again[row[0]], *row[1:])])
 
 
 def _rows(change: Change, table: str, version: int) -> list[Row]:

@@ -33,7 +33,7 @@ def learn(studio: Writes, body: NewMovement) -> dict[str, Any]:
 
 @router.post("/example", response_model=records.LearnedOut, summary="Learn an example: letters, gestures or arm")
 def learn_example(studio: Writes, body: ExampleRequest) -> dict[str, Any]:
-    """Into a library that holds nothing, or movements of as many dimensions."""
+    """Into a library that never held movements, or held those of as many dimensions, also if an undo took them back."""
     report = studio.library.learn(load_example(body.name))
     return {"ids": report.ids.tolist(), "version": report.version}
 
