@@ -20,7 +20,7 @@ from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
-from kineme.validation import Array, describe
+from kineme.validation import Array, as_array, describe
 
 _SHOWN = 8  # names of dimensions
 _NESTED = 8  # records around movements; more are a mistake, such as a stand-in that has every attribute
@@ -159,7 +159,7 @@ class Demonstrations(Presented, Sequence[Trajectory]):
             return cls.of(held)
         if (frames := frames_of(movements)) is not None:
             return cls.from_dataframe(frames)
-        several: Any = [movements] if isinstance(movements, Trajectory) else movements
+        several: Any = [movements] if isinstance(movements, Trajectory) else as_array(movements)
         if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
             if any(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
