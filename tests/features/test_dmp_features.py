@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
@@ -184,8 +185,18 @@ def test_parameters_out_of_range_are_refused_in_fit(demos, parameters, message):
 
 def test_movements_of_other_dimensions_are_refused(demos, make_movement):
     features = DMPFeatures().fit(demos)
-    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 3; fit again"):
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as learned, got 3; select"):
         features.transform([make_movement(0, 3)[1]])
+
+
+@pytest.mark.parametrize("columns", [{"x [m]": 0.001, "y [m]": 0.001}, {"y [mm]": 1.0, "x [mm]": 1.0}])
+def test_known_columns_come_in_the_order_and_units_of_the_fit(make_movement, columns):
+    t, x = make_movement(1, 2)
+    learned = pd.DataFrame({"t": t, "x [mm]": x[:, 0], "y [mm]": x[:, 1]})
+    factor = {"x [m]": x[:, 0], "x [mm]": x[:, 0], "y [m]": x[:, 1], "y [mm]": x[:, 1]}
+    other = pd.DataFrame({"t": t} | {name: factor[name] * unit for name, unit in columns.items()})
+    features = DMPFeatures().fit(learned)
+    np.testing.assert_allclose(features.transform(other), features.transform(learned), rtol=1e-9)
 
 
 def test_closed_movements_are_refused_where_the_feature_divides(demos):

@@ -1,6 +1,7 @@
 """Features of orientations and poses: what leaves them unchanged, what turns them, how radians are weighed."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from sklearn.base import clone
@@ -68,6 +69,17 @@ def test_they_recognize_orientation_gestures_in_a_pipeline():
     names = model[0].get_feature_names_out()
     assert (len(names), names[0], names[-1]) == (120, "rx_1", "rz_40")
     assert PoseFeatures().fit([carry(0)]).get_feature_names_out()[300] == "rx_1"
+
+
+def test_known_columns_come_in_the_units_of_the_fit():
+    x = carry(0)
+    columns = {"time": np.arange(len(x)) / 50, **dict(zip(("qw", "qx", "qy", "qz"), x[:, 3:].T, strict=True))}
+    millimeters, meters = (
+        pd.DataFrame(columns | {f"{axis} [{unit}]": x[:, i] * factor for i, axis in enumerate("xyz")})
+        for unit, factor in (("mm", 1000), ("m", 1))
+    )
+    features = PoseFeatures().fit(millimeters)
+    agree(features.transform(meters), features.transform(millimeters))
 
 
 def test_wrong_input_is_refused():

@@ -15,8 +15,10 @@ from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.pose.tangent import as_poses, to_tangent
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import axis_names
+from kineme.movements.trajectories.movements import axis_names, in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import check_choice, check_count, check_number
 
@@ -56,6 +58,7 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
     _specification_type: ClassVar[type]  # of the specification
     dmp_: Specification
     n_dims_: int
+    channels_: Channels | None
 
     def __init__(
         self,
@@ -100,27 +103,26 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
         return self
 
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
-        """Check the parameters and store the number of dimensions; y is ignored."""
+        """Check the parameters and store what the dimensions are; y is ignored."""
         check_choice("feature", self.feature, list(FEATURES))
         check_count("n_samples", self.n_samples, 2)
         check_choice("dtype", self.dtype, ("float64", "float32"))
         self.dmp_ = self._specification()
-        self.n_dims_ = Demonstrations.of(X).n_dims
+        demonstrations = Demonstrations.of(X)
+        self.channels_ = demonstrations.channels
+        self.n_dims_ = in_coordinates(demonstrations.movements).positions.shape[1]
         return self
 
     def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
+        Columns that are known are put in the order and converted to the units of those of `fit`.
+
         Raises `TrajectoryError`: movements that cannot be used, or of other dimensions than those of `fit`. Raises
         `DegenerateMovementError`: weights or forcing in the original formulation where ``g = x0``.
         """
         check_is_fitted(self)
-        demonstrations = Demonstrations.of(X)
-        if demonstrations.n_dims != self.n_dims_:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims_} dimensions as in fit, got {demonstrations.n_dims}; "
-                "fit again, or select the dimensions by columns= of read_recordings, in the shell --columns"
-            )
+        demonstrations = as_learned(X, self.channels_, self.n_dims_)
         return features_of(self.dmp_.learn(demonstrations), self.feature, self.n_samples).astype(self.dtype, copy=False)
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
@@ -172,6 +174,8 @@ class DMPFeatures(MovementFeatures[DMP]):
         The specification in force.
     n_dims_ : int
         Dimensions d of the training movements.
+    channels_ : tuple of Channel or None
+        What they are, where that is known.
 
     Examples
     --------
@@ -209,6 +213,8 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
         most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
     n_dims_ : int
         Dimensions d of the training movements.
+    channels_ : tuple of Channel or None
+        What they are, where that is known.
     """
 
     _specification_type: ClassVar[type] = RhythmicDMP
@@ -245,6 +251,8 @@ class PoseFeatures(_TakesMovements):
         The fitted transformer behind it.
     n_columns_ : int
         4 for orientations, 7 for poses.
+    channels_ : tuple of Channel or None
+        What the columns are, where one of them is known to be an orientation.
 
     Notes
     -----
@@ -262,7 +270,9 @@ class PoseFeatures(_TakesMovements):
         """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
-        demonstrations = as_poses(X)
+        given = Demonstrations.of(X)
+        self.channels_ = None if given.channels is None or is_plain(given.channels) else given.channels
+        demonstrations = as_poses(given)
         self.n_columns_ = demonstrations.n_dims
         self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
         self.features_.set_params(dmp__preprocessing=())  # applied in to_tangent, before the goal is read
@@ -275,7 +285,8 @@ class PoseFeatures(_TakesMovements):
         Raises `TrajectoryError`: movements that cannot be used, or orientations where `fit` saw poses.
         """
         check_is_fitted(self)
-        demonstrations = as_poses(X)
+        known = X if self.channels_ is None else as_learned(X, self.channels_, len(learned_names(self.channels_)))
+        demonstrations = as_poses(known)
         if demonstrations.n_dims != self.n_columns_:
             raise TrajectoryError(
                 f"expected movements of {self.n_columns_} columns as in fit, got {demonstrations.n_dims}; fit again"
