@@ -85,6 +85,22 @@ def test_lists_of_what_holds_movements_are_one_after_the_other():
     _same(Demonstrations.of(held), pair)
 
 
+@pytest.mark.parametrize("form", ["collections", "blocks", "lists", "lists of arrays", "objects", "frames"])
+def test_lists_may_hold_any_form(form):
+    demos = Demonstrations.of(np.stack([X, 2 * X]))
+    first, second = demos
+    frame = Demonstrations.of([first]).to_pandas()
+    given = {
+        "collections": [demos, demos],
+        "blocks": [np.stack([X, 2 * X])] * 2,
+        "lists": [[first, second], (first, second)],
+        "lists of arrays": [[X, 2 * X]] * 2,
+        "objects": np.array([first, second, first, second], dtype=object),
+        "frames": [frame, second, frame, second],
+    }
+    np.testing.assert_array_equal(Demonstrations.of(given[form]).positions, np.concatenate([X, 2 * X] * 2))
+
+
 def test_names_of_files_are_no_movements():
     with pytest.raises(TrajectoryError, match=r"got 'new.csv'; read files with kineme.read_recordings"):
         Demonstrations.of(["new.csv"])
