@@ -130,7 +130,7 @@ def test_two_movements_are_laid_over_each_other():
     assert explanation.nearest.differences.max() < 0.06  # a prior on rotations leaves some
     assert explanation.in_words.startswith(f"{movement.name} beside turned (")
     assert "times as large, turned by -" in explanation.answer
-    assert "2.00 times as fast" in explanation.answer
+    assert "2 times as fast" in explanation.answer
     np.testing.assert_allclose(explanation.path[0], movement.positions[0], atol=1)
     far = compare(movement, LETTERS[0])
     assert far.nearest.similarity < 0.5 < explanation.nearest.similarity
@@ -139,6 +139,22 @@ def test_two_movements_are_laid_over_each_other():
     assert exact.nearest.differences.max() < 1e-3
     titles = [axes.get_title() for axes in far.plot().axes]
     assert titles[0].startswith(f"{LETTERS[0].name}, ")  # no rank
+
+
+@pytest.mark.parametrize(
+    ("factor", "pace", "parameters", "words"),
+    [
+        ([3, 1], 1, {"scale": "per-dimension", "max_angle": 0}, "2.99 by 1 times as large, 1 times as fast"),
+        ([1, 3], 1, {"scale": "per-dimension", "max_angle": 0}, "1 by 3 times as large, 1 times as fast"),
+        (1000, 0.001, {}, "1,000 times as large, 0.001 times as fast"),
+        (3, 1, {"scale": "none"}, "1 times as fast"),
+        (3, 1, {"classifier": "svm"}, "3 times as large, 1 times as fast"),
+    ],
+)
+def test_sizes_and_tempos_are_those_of_the_movements(factor, pace, parameters, words):
+    movement = LETTERS[0]
+    other = kineme.Trajectory(movement.times / pace, movement.positions * factor, name="sized")
+    assert compare(other, movement, kineme.Recognizer(**parameters)).answer.endswith(f"({words})")
 
 
 def test_movements_without_names_are_first_and_second():

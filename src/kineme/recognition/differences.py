@@ -230,10 +230,16 @@ def compare(movement: MovementLike, other: MovementLike, recognizer: Recognizer 
         )
     called = [(each[0].name, each[0].label, default) for each, default in zip(both, ("first", "second"), strict=True)]
     names = [str(next(name for name in each if name is not None)) for each in called]
-    answer = clone(recognizer or Recognizer()).fit(both[1], [names[1]]).recognize(both[0][0])
+    one_class = clone(recognizer or Recognizer()).set_params(classifier="nearest")  # a support vector machine needs two
+    answer = one_class.fit(both[1], [names[1]]).recognize(both[0][0])
     transform = answer.transform
-    turned, sizes = math.degrees(transform.angle), np.unique(transform.scale.round(2))
-    how = [f"{' by '.join(f'{size:g}' for size in sizes)} times as large"]
+    turned, sizes = math.degrees(transform.angle), [*map(_rounded, transform.scale.tolist())]
+    how = [f"{' by '.join(sizes[:1] if len({*sizes}) == 1 else sizes)} times as large"] * (one_class.scale != "none")
     how += [f"turned by {turned:.0f} degrees"] * (abs(turned) >= 0.5)
-    how += [f"{1 / transform.duration_ratio:.2f} times as fast"]
+    how += [f"{_rounded(1 / transform.duration_ratio)} times as fast"]
     return replace(answer.explain(), answer=f"{names[0]} beside {names[1]} ({', '.join(how)})")
+
+
+def _rounded(factor: float) -> str:
+    """Three digits of a factor of any size, as 0.001 or 1,230."""
+    return f"{float(f'{factor:.3g}'):,g}"
