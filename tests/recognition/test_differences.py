@@ -114,6 +114,19 @@ def test_what_cannot_be_left_out_is_refused():
         confusion(LETTERS, folds=1)
 
 
+def test_a_class_that_none_could_recognize_is_refused():
+    """Of which no movement is left to learn from, when a person, or the persons of a fold, are left out."""
+    classes = np.unique(LETTERS.labels, return_inverse=True)[1]
+    with pytest.raises(SpecificationError, match=r"all groups of a class left out: CShape, GShape, .*; leave"):
+        confusion(LETTERS, groups=classes)
+    people = np.where(classes == 0, 0, np.arange(21) % 3)
+    with pytest.raises(SpecificationError, match="left out: CShape;"):
+        confusion(LETTERS, groups=people)
+    together = np.array([0, 3])[np.arange(7) % 2].tolist() + [*[1] * 6, 0] * 2
+    with pytest.raises(SpecificationError, match=r"left out: CShape; .*without folds="):
+        confusion(LETTERS, groups=together, folds=2)
+
+
 def test_a_data_frame_has_every_class_whatever_it_is_called():
     pytest.importorskip("pandas")
     frame = Confusion(("class", "new"), np.array([[1, 2, 3], [4, 5, 6]])).to_pandas()

@@ -21,7 +21,7 @@ from kineme.recognition.explanation import Explanation
 from kineme.recognition.recognizer import Recognizer
 from kineme.reporting.page import inline
 from kineme.reporting.table import data_frame
-from kineme.reporting.text import counted, drawable, shortened
+from kineme.reporting.text import counted, drawable, first_names, shortened
 from kineme.validation import check_count
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _NEW = "new"  # the answer to a movement that is called unknown
 _DRAWN, _NAME = 40, 24  # classes of a figure, and letters of their names
+_NAMED = 3  # classes in a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +168,8 @@ def confusion(
     Raises
     ------
     SpecificationError
-        One group only, or, without groups, a class of one movement.
+        One group only, a class whose groups are all left out at once, as where it has one, or, without groups, a class
+        of one movement.
     TrajectoryError
         Not one label, or not one group, for each movement.
     """
@@ -191,7 +193,14 @@ def confusion(
         splitter = LeaveOneGroupOut() if n_folds == n_parts else GroupKFold(n_folds)
     answers = np.empty(len(demos), dtype=np.intp)
     index_of = {label: c for c, label in enumerate(classes.tolist())}
-    for train, test in splitter.split(np.zeros(len(demos)), truth, numbers):
+    parts = list(splitter.split(np.zeros(len(demos)), truth, numbers))
+    if lost := sorted({c for train, test in parts for c in np.setdiff1d(truth[test], truth[train]).tolist()}):
+        raise SpecificationError(
+            "expected each class in groups of which some stay to learn from, got all groups of a class left out: "
+            f"{first_names(classes[lost].tolist(), _NAMED)}; leave the class out, record it with others, or leave one "
+            "group out at a time, without folds="
+        )
+    for train, test in parts:
         known_groups = None if numbers is None or error_rate is None else numbers[train]
         fitted = clone(recognizer or Recognizer()).fit(demos[train], labels[train], known_groups)
         given = fitted.predict(demos[test]) if error_rate is None else fitted.predict_known(demos[test], error_rate)
