@@ -142,6 +142,16 @@ def test_names_belong_to_the_fit(demos):
     assert len(features.get_feature_names_out()) == features.transform(demos).shape[1]
 
 
+@pytest.mark.parametrize("changed", [{"feature": "weights", "dmp__n_basis": 9}, {"n_samples": 7}, {"dtype": "float32"}])
+def test_parameters_are_in_force_from_the_next_fit(demos, changed):
+    features = DMPFeatures(n_samples=20).fit(demos)
+    before, names = features.transform(demos), features.get_feature_names_out()
+    features.set_params(**changed)
+    np.testing.assert_array_equal(features.transform(demos), before, strict=True)
+    assert features.get_feature_names_out().tolist() == names.tolist()
+    features.set_params(feature="no feature").transform(demos)
+
+
 def test_the_default_output_can_be_asked_for(demos):
     features = DMPFeatures(n_samples=6).set_output(transform="default")
     assert isinstance(features.fit_transform(demos), np.ndarray)

@@ -107,6 +107,7 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
         check_choice("feature", self.feature, list(FEATURES))
         check_count("n_samples", self.n_samples, 2)
         check_choice("dtype", self.dtype, ("float64", "float32"))
+        self.feature_, self.n_samples_, self.dtype_ = self.feature, self.n_samples, self.dtype
         self.dmp_ = self._specification()
         demonstrations = Demonstrations.of(X)
         self.channels_ = demonstrations.channels
@@ -123,12 +124,13 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
         """
         check_is_fitted(self)
         demonstrations = as_learned(X, self.channels_, self.n_dims_)
-        return features_of(self.dmp_.learn(demonstrations), self.feature, self.n_samples).astype(self.dtype, copy=False)
+        rows = features_of(self.dmp_.learn(demonstrations), self.feature_, self.n_samples_)
+        return rows.astype(self.dtype_, copy=False)
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Names x_1 ... x_S, y_1 ... y_S; beyond three dimensions q1_1 ... q1_S, q2_1 ..."""
         check_is_fitted(self)
-        size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
+        size = self.dmp_.n_basis if self.feature_ == "weights" else self.n_samples_
         names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
         return np.array(names, dtype=object)
 
@@ -172,6 +174,8 @@ class DMPFeatures(MovementFeatures[DMP]):
     ----------
     dmp_ : DMP
         The specification in force.
+    feature_, n_samples_, dtype_
+        The parameters in force, those of `fit`.
     n_dims_ : int
         Dimensions d of the training movements.
     channels_ : tuple of Channel or None
@@ -211,6 +215,8 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     dmp_ : RhythmicDMP
         The specification in force. Unless `align_on` is given, it is the dimension with the largest first harmonic in
         most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
+    feature_, n_samples_, dtype_
+        The parameters in force, those of `fit`.
     n_dims_ : int
         Dimensions d of the training movements.
     channels_ : tuple of Channel or None
@@ -249,6 +255,8 @@ class PoseFeatures(_TakesMovements):
     ----------
     features_ : DMPFeatures
         The fitted transformer behind it.
+    orientation_weight_ : float
+        The weight in force, that of `fit`.
     n_columns_ : int
         4 for orientations, 7 for poses.
     channels_ : tuple of Channel or None
@@ -269,6 +277,7 @@ class PoseFeatures(_TakesMovements):
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
+        self.orientation_weight_ = float(self.orientation_weight)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
         given = Demonstrations.of(X)
         self.channels_ = None if given.channels is None or is_plain(given.channels) else given.channels
@@ -304,6 +313,6 @@ class PoseFeatures(_TakesMovements):
         tangent, _ = to_tangent(demonstrations, self.steps_)
         if tangent.n_dims == 3:
             return tangent
-        weights = np.repeat([1.0, float(self.orientation_weight)], 3)
+        weights = np.repeat([1.0, self.orientation_weight_], 3)
         weighted = replace(tangent.movements, positions=tangent.positions * weights)
         return Demonstrations.of_movements(weighted, tangent.steps)
