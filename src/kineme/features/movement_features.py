@@ -28,7 +28,7 @@ FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any
     "forcing": lambda primitives, n_samples: primitives.forcing(n_samples),
     "weights": lambda primitives, _: primitives.weights,
 }
-_NESTED = "dmp__"
+_NESTED, _FEATURES = "dmp__", "features__"
 
 Specification = TypeVar("Specification", DMP, RhythmicDMP)
 
@@ -273,6 +273,23 @@ class PoseFeatures(_TakesMovements):
     def __init__(self, features: DMPFeatures | None = None, orientation_weight: float = 0.2) -> None:
         self.features = features
         self.orientation_weight = orientation_weight
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters by name; with `deep` also those of `features`, as ``features__n_samples`` and so on."""
+        parameters = super().get_params(deep)
+        if deep and self.features is None:
+            parameters |= {_FEATURES + name: value for name, value in DMPFeatures().get_params().items()}
+        return parameters
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters by name; ``features__n_samples`` and so on set those of `features`, which are made if need be.
+
+        Raises `ValueError`: a name that is no parameter. Raises `SpecificationError`: a value out of the range of a
+        field.
+        """
+        if parameters.get("features", self.features) is None and any(name.startswith(_FEATURES) for name in parameters):
+            parameters["features"] = DMPFeatures()
+        return super().set_params(**parameters)
 
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and the movements; y is ignored."""
