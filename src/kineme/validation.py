@@ -27,6 +27,7 @@ LARGEST_POSITION, SMALLEST_EXTENT = LARGEST, 1 / LARGEST
 SHORTEST_STEP, LARGEST_STAMP = 1e-50, 1e50  # seconds
 _SMALL_POSITION = SMALLEST_EXTENT / np.finfo(np.float64).eps  # beyond it, no extent can be too small
 _FLOAT64 = np.dtype(np.float64)
+_NO_ARRAY = ("demonstrations", "columns", "to_frame")  # of movements, of tables and of their columns
 
 
 def describe(index: int, names: Sequence[str | None] | None) -> str:
@@ -63,10 +64,27 @@ def too_long_integer(values: Any) -> int | None:
     return int(values[long][0]) if long.any() else None
 
 
+def as_array(values: Any, who: str = "movements") -> Any:
+    """An ndarray of an array of any package, as of PyTorch, and of objects that are numbers; all else as it is."""
+    if isinstance(values, np.ndarray):
+        is_hidden = values.dtype == object and values.size and all(isinstance(item, Real) for item in values.flat)
+        return values.astype(np.float64) if is_hidden else values
+    if isinstance(values, (list, tuple, np.generic)) or any(hasattr(values, name) for name in _NO_ARRAY):
+        return values
+    try:
+        values = values.detach() if hasattr(values, "detach") else values  # PyTorch does not convert what has gradients
+        if hasattr(values, "__array__") or isinstance(values, memoryview):
+            return np.asarray(values)
+        return np.from_dlpack(values) if hasattr(values, "__dlpack__") else values
+    except (TypeError, ValueError, RuntimeError, BufferError) as error:
+        raise TrajectoryError(f"{who}: expected an array of numbers, got {error}") from error
+
+
 def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers") -> Array:
     """Anything that NumPy converts to numbers, as float64; complex numbers are refused, also inside lists."""
     if _is_float64(values):
         return values
+    values = as_array(values, who)
     refuse_lossy(values, who)
     try:
         array = np.asarray(values)
@@ -86,6 +104,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     """
     if _is_float64(positions) and positions.ndim == 2 and len(positions) >= MIN_SAMPLES and positions.shape[1]:
         return positions
+    positions = as_array(positions, who)
     x = as_numbers(positions, who, "positions to be an array of numbers")
     if x is not positions and (integer := too_long_integer(np.asarray(positions))) is not None:
         raise TrajectoryError(f"{who}: expected positions that floats can hold, got {integer}{ROUNDED}")

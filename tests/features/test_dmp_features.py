@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
@@ -141,6 +142,16 @@ def test_names_belong_to_the_fit(demos):
     assert len(features.get_feature_names_out()) == features.transform(demos).shape[1]
 
 
+@pytest.mark.parametrize("changed", [{"feature": "weights", "dmp__n_basis": 9}, {"n_samples": 7}, {"dtype": "float32"}])
+def test_parameters_are_in_force_from_the_next_fit(demos, changed):
+    features = DMPFeatures(n_samples=20).fit(demos)
+    before, names = features.transform(demos), features.get_feature_names_out()
+    features.set_params(**changed)
+    np.testing.assert_array_equal(features.transform(demos), before, strict=True)
+    assert features.get_feature_names_out().tolist() == names.tolist()
+    features.set_params(feature="no feature").transform(demos)
+
+
 def test_the_default_output_can_be_asked_for(demos):
     features = DMPFeatures(n_samples=6).set_output(transform="default")
     assert isinstance(features.fit_transform(demos), np.ndarray)
@@ -184,8 +195,18 @@ def test_parameters_out_of_range_are_refused_in_fit(demos, parameters, message):
 
 def test_movements_of_other_dimensions_are_refused(demos, make_movement):
     features = DMPFeatures().fit(demos)
-    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 3; fit again"):
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as learned, got 3; select"):
         features.transform([make_movement(0, 3)[1]])
+
+
+@pytest.mark.parametrize("columns", [{"x [m]": 0.001, "y [m]": 0.001}, {"y [mm]": 1.0, "x [mm]": 1.0}])
+def test_known_columns_come_in_the_order_and_units_of_the_fit(make_movement, columns):
+    t, x = make_movement(1, 2)
+    learned = pd.DataFrame({"t": t, "x [mm]": x[:, 0], "y [mm]": x[:, 1]})
+    factor = {"x [m]": x[:, 0], "x [mm]": x[:, 0], "y [m]": x[:, 1], "y [mm]": x[:, 1]}
+    other = pd.DataFrame({"t": t} | {name: factor[name] * unit for name, unit in columns.items()})
+    features = DMPFeatures().fit(learned)
+    np.testing.assert_allclose(features.transform(other), features.transform(learned), rtol=1e-9)
 
 
 def test_closed_movements_are_refused_where_the_feature_divides(demos):

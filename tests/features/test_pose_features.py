@@ -1,9 +1,11 @@
 """Features of orientations and poses: what leaves them unchanged, what turns them, how radians are weighed."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
@@ -68,6 +70,35 @@ def test_they_recognize_orientation_gestures_in_a_pipeline():
     names = model[0].get_feature_names_out()
     assert (len(names), names[0], names[-1]) == (120, "rx_1", "rz_40")
     assert PoseFeatures().fit([carry(0)]).get_feature_names_out()[300] == "rx_1"
+
+
+def test_known_columns_come_in_the_units_of_the_fit():
+    x = carry(0)
+    columns = {"time": np.arange(len(x)) / 50, **dict(zip(("qw", "qx", "qy", "qz"), x[:, 3:].T, strict=True))}
+    millimeters, meters = (
+        pd.DataFrame(columns | {f"{axis} [{unit}]": x[:, i] * factor for i, axis in enumerate("xyz")})
+        for unit, factor in (("mm", 1000), ("m", 1))
+    )
+    features = PoseFeatures().fit(millimeters)
+    agree(features.transform(meters), features.transform(millimeters))
+
+
+def test_parameters_of_the_features_are_searched_without_any_given():
+    poses = [carry(seed) for seed in range(8)]
+    model = make_pipeline(PoseFeatures(), KNeighborsClassifier(1))
+    grid = {"posefeatures__features__dmp__n_basis": [7, 9], "posefeatures__features__n_samples": [6]}
+    search = GridSearchCV(model, grid, cv=2).fit(poses, [0, 1] * 4)
+    found = search.best_estimator_[0].features_
+    assert (found.dmp_.n_basis in (7, 9), found.n_samples) == (True, 6)
+    parameters = PoseFeatures().get_params()
+    assert {"features", "orientation_weight", "features__feature", "features__dmp__n_basis"} <= set(parameters)
+    assert clone(PoseFeatures()).features is None
+    given = DMPFeatures(n_samples=5)
+    PoseFeatures().set_params(features=given, features__n_samples=6)
+    assert given.n_samples == 6
+    assert PoseFeatures(given).set_params(features=None, features__n_samples=7).features.n_samples == 7
+    with pytest.raises(ValueError, match="basis"):
+        PoseFeatures().set_params(features__basis=3)
 
 
 def test_wrong_input_is_refused():

@@ -64,5 +64,5 @@ def test_parameters_are_passed_on_and_cloned(demos):
 def test_other_dimensions_and_types(demos):
     transformer = RhythmicFeatures(dtype="float32").fit(demos)
     assert transformer.transform(demos).dtype == np.float32
-    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 1"):
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as learned, got 1"):
         transformer.transform([np.sin(np.linspace(0, 20, 90))])

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from kernel_samples import ALL, NAMED
 from sklearn.base import clone
+from sklearn.decomposition import KernelPCA
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
+from kineme.errors import SpecificationError
 from kineme.kernels import RBF, TruncatedEuclidean, averaged
 
 
@@ -52,3 +54,11 @@ def test_rbf_is_that_of_the_classifier(two_classes):
     X, y = two_classes
     ours, theirs = SVC(kernel=RBF(2.0)).fit(X, y), SVC(kernel="rbf", gamma=1 / 8).fit(X, y)
     np.testing.assert_allclose(ours.decision_function(X), theirs.decision_function(X), atol=1e-3)
+
+
+def test_models_that_ask_pair_by_pair_are_given_the_matrix():
+    rows = np.random.default_rng(0).random((8, 3))
+    with pytest.raises(SpecificationError, match=r"kernel='precomputed' and the matrix kernel.fit\(X\)\(X\)"):
+        KernelPCA(2, kernel=RBF()).fit(rows)
+    kernel = RBF().fit(rows)
+    assert KernelPCA(2, kernel="precomputed").fit(kernel(rows)).transform(kernel(rows[:3], rows)).shape == (3, 2)

@@ -63,6 +63,15 @@ def test_a_primitive_is_where_it_was_learned_until_it_is_dragged():
         _ = Draw().goal
 
 
+def test_the_path_has_the_label_and_the_name_of_its_primitive():
+    demos = demonstrations()[[0, 1]]
+    path = Move(kineme.DMP().learn(demos)).path
+    assert (path.label, path.name) == ("CShape", demos.names[0])
+    numbers = kineme.Demonstrations.from_arrays([movement.positions for movement in demos], [3, 4])
+    assert Move(kineme.DMP().learn(numbers)).path.label == 3
+    assert Move(kineme.DMP().learn(demos[0].positions)).path.label is None
+
+
 def test_a_movement_is_placed_from_python():
     move = Move(kineme.DMP().learn(demonstrations()[[0, 3]]))
     via = [[0.5, (move.path.positions[100] + [3.0, 1.0]).tolist()]]
@@ -75,6 +84,8 @@ def test_a_movement_is_placed_from_python():
     before = move.moved
     with pytest.raises(TrajectoryError, match="goal of shape"):
         move.place(goal=[1.0, 2.0, 3.0])
+    with pytest.raises(TrajectoryError, match="of one movement, got 2 of them"):
+        move.place(goal=[[1.0, 2.0], [3.0, 4.0]])
     assert move.moved == before
 
 

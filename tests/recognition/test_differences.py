@@ -114,6 +114,19 @@ def test_what_cannot_be_left_out_is_refused():
         confusion(LETTERS, folds=1)
 
 
+def test_a_class_that_none_could_recognize_is_refused():
+    """Of which no movement is left to learn from, when a person, or the persons of a fold, are left out."""
+    classes = np.unique(LETTERS.labels, return_inverse=True)[1]
+    with pytest.raises(SpecificationError, match=r"all groups of a class left out: CShape, GShape, .*; leave"):
+        confusion(LETTERS, groups=classes)
+    people = np.where(classes == 0, 0, np.arange(21) % 3)
+    with pytest.raises(SpecificationError, match="left out: CShape;"):
+        confusion(LETTERS, groups=people)
+    together = np.array([0, 3])[np.arange(7) % 2].tolist() + [*[1] * 6, 0] * 2
+    with pytest.raises(SpecificationError, match=r"left out: CShape; .*without folds="):
+        confusion(LETTERS, groups=together, folds=2)
+
+
 def test_a_data_frame_has_every_class_whatever_it_is_called():
     pytest.importorskip("pandas")
     frame = Confusion(("class", "new"), np.array([[1, 2, 3], [4, 5, 6]])).to_pandas()
@@ -130,7 +143,7 @@ def test_two_movements_are_laid_over_each_other():
     assert explanation.nearest.differences.max() < 0.06  # a prior on rotations leaves some
     assert explanation.in_words.startswith(f"{movement.name} beside turned (")
     assert "times as large, turned by -" in explanation.answer
-    assert "2.00 times as fast" in explanation.answer
+    assert "2 times as fast" in explanation.answer
     np.testing.assert_allclose(explanation.path[0], movement.positions[0], atol=1)
     far = compare(movement, LETTERS[0])
     assert far.nearest.similarity < 0.5 < explanation.nearest.similarity
@@ -139,6 +152,22 @@ def test_two_movements_are_laid_over_each_other():
     assert exact.nearest.differences.max() < 1e-3
     titles = [axes.get_title() for axes in far.plot().axes]
     assert titles[0].startswith(f"{LETTERS[0].name}, ")  # no rank
+
+
+@pytest.mark.parametrize(
+    ("factor", "pace", "parameters", "words"),
+    [
+        ([3, 1], 1, {"scale": "per-dimension", "max_angle": 0}, "2.99 by 1 times as large, 1 times as fast"),
+        ([1, 3], 1, {"scale": "per-dimension", "max_angle": 0}, "1 by 3 times as large, 1 times as fast"),
+        (1000, 0.001, {}, "1,000 times as large, 0.001 times as fast"),
+        (3, 1, {"scale": "none"}, "1 times as fast"),
+        (3, 1, {"classifier": "svm"}, "3 times as large, 1 times as fast"),
+    ],
+)
+def test_sizes_and_tempos_are_those_of_the_movements(factor, pace, parameters, words):
+    movement = LETTERS[0]
+    other = kineme.Trajectory(movement.times / pace, movement.positions * factor, name="sized")
+    assert compare(other, movement, kineme.Recognizer(**parameters)).answer.endswith(f"({words})")
 
 
 def test_movements_without_names_are_first_and_second():

@@ -187,6 +187,18 @@ def test_probabilities_are_those_of_the_answers(classifier):
     np.testing.assert_allclose(recognizer.predict_proba(fresh), answers, rtol=1e-9)
 
 
+@pytest.mark.parametrize("pair", [(0.5, 1.5), (10**30, 1), (b"a", b"b"), (False, True), ("a", "b")])
+def test_labels_of_any_kind_are_scored(pair):
+    demos = draw_shapes([2, 2])
+    labels = [pair[0]] * 2 + [pair[1]] * 2
+    wrong = [pair[0]] * len(demos)
+    recognizer = Recognizer(classifier="nearest").fit(demos, labels)
+    assert (recognizer.score(demos, labels), recognizer.score(demos, wrong)) == (1.0, 0.5)
+    assert recognizer.score(demos, wrong, sample_weight=[label == pair[0] for label in labels]) == 1.0
+    with pytest.raises(TrajectoryError, match="expected labels as those of fit"):
+        recognizer.score(demos, [1 if isinstance(pair[0], str) else "a"] * len(demos))
+
+
 def test_it_is_a_scikit_learn_classifier():
     demos = draw_shapes([4] * 3)
     arrays = np.array([one.positions for one in demos])

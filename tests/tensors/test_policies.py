@@ -160,3 +160,15 @@ def test_trajectories_have_the_duration_and_rate_that_are_set():
     trajectories.reset()
     with pytest.raises(SpecificationError, match="expected set_params"):
         trajectories.get_traj_pos()
+
+
+def test_samples_are_those_after_the_initial_time():
+    primitive = kineme.torch.Primitive(dims=2, n_weights=8, rate=100, duration=1.0)
+    trajectories = Trajectories(primitive)
+    trajectories.set_params(torch.zeros(18))
+    trajectories.set_duration(1.0, 0.01)
+    for time, n_after in ((0.012, 99), (0.018, 99), (0.29, 71), (0.999, 1), (1.0, 0)):
+        trajectories.set_initial_conditions(time, torch.zeros(2), torch.zeros(2))
+        assert len(trajectories.get_traj_pos()) == n_after
+    with pytest.raises(SpecificationError, match="expected the same initial time for all of a batch"):
+        trajectories.set_initial_conditions(torch.tensor([0.1, 0.5]), torch.zeros(2, 2), torch.zeros(2, 2))

@@ -188,6 +188,32 @@ def test_weights_mean_the_same_at_another_rate(formulation):
     assert torch.equal(mp(derivative=(0, 1))[1], mp(derivative=1))
 
 
+def test_the_shapes_of_all_inputs_broadcast():
+    primitive = module()
+    w, x, g, v = tensors((2, 6), 2, 2, 2)
+    tau, several = torch.linspace(1, 2, 5, dtype=torch.float64), torch.stack([x] * 5)
+    paths = primitive(w, x, g, duration=tau, derivative=(0, 1, 2))
+    for path, at_one in zip(paths, primitive(w, x, g, duration=2.0, derivative=(0, 1, 2)), strict=True):
+        assert path.shape == (5, primitive.n_samples, 2)
+        torch.testing.assert_close(path[4], at_one)
+    again = primitive.replan(w, at=0.3, goal=g, position=x, velocity=v, duration=2.0)
+    torch.testing.assert_close(primitive.replan(w, at=0.3, goal=g, position=x, velocity=v, duration=tau)[4], again)
+    many = primitive.replan(w, at=0.3, goal=g, position=several, velocity=v, duration=2.0)
+    torch.testing.assert_close(many[4], again)
+    position, velocity = primitive.state(0.3, w, x, g, duration=tau)
+    assert position.shape == velocity.shape == (5, 2)
+    with pytest.raises(RuntimeError, match="size"):
+        kineme.torch.Primitive.of(learned(n=7))(duration=tau)
+
+
+def test_inputs_of_another_precision_are_converted():
+    primitive = module(dtype=torch.float32)
+    w, x, g, chol = tensors((2, 6), 2, 2, (12, 12))
+    positions = primitive(w, x, g).double()
+    assert {each.dtype for each in primitive.encode(positions)} == {torch.float32}
+    assert primitive.log_prob(positions, w, chol.tril()).dtype == torch.float32
+
+
 def test_what_cannot_be_used_is_refused():
     mp = module()
     weights, start, goal = tensors((4, 2, 6), (4, 2), (4, 2))

@@ -17,7 +17,7 @@ from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import as_indices, label_array
-from kineme.movements.trajectories.movements import Names, axis_names
+from kineme.movements.trajectories.movements import Names, axis_names, set_read_only_state
 from kineme.reporting.page import thumbnail
 from kineme.reporting.table import Table, to_html
 from kineme.reporting.text import counted
@@ -54,6 +54,8 @@ class Batch:
     labels: NDArray[Any] | None
     names: Names
     recorded_as: RecordedAs | None
+
+    __setstate__ = set_read_only_state
 
     def __post_init__(self) -> None:
         make_read_only(self, self.ROWS)

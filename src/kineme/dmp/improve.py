@@ -177,7 +177,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
     smallest : float, default 1e-4
         Stop when the exploration is less than this share of the extent.
     start, goal, duration, n_samples : optional
-        Of the movements that are tried, as in `Primitives.rollout`.
+        Of the movements that are tried, as in `Primitives.rollout`, and of the resulting primitive.
     progress : bool, default False
         Show a progress bar.
 
@@ -217,6 +217,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
         raise SpecificationError(f"expected cost to be a function of a Rollout, got {cost!r}")
     if not isinstance(seed, np.random.Generator):
         check_seed("seed", seed)
+    primitive = Primitives.from_rollout(primitive.rollout(start, goal, duration))
     unit = exploration_factor(primitive.dmp)
     factor = unit * primitive.extents.max() * exploration
     responses = unit @ decoder(primitive.dmp, primitive.dmp.n_points).Phi[0].T
@@ -228,7 +229,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
     with tqdm(total=updates, desc="improving", leave=False, disable=not progress) as bar:
         for update in range(updates):
             drawn = search.draw(rollouts, rng)
-            moved = variants(primitive, factor, drawn).rollout(start, goal, duration, n_samples=n_samples)
+            moved = variants(primitive, factor, drawn).rollout(n_samples=n_samples)
             costs = checked_costs(cost(moved), rollouts, update)
             tried.append(costs)
             sizes.append(exploration * largest_deviation(search, responses))

@@ -18,7 +18,7 @@ from kineme.movements.channels.channel import Channels, is_plain, learned_names,
 from kineme.movements.channels.coordinates import columns_of, columns_of_kinds, period_of_channel
 from kineme.movements.preparation.trim import Step, TrimRest, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements, of_channels, samples_of
+from kineme.movements.trajectories.movements import Movements, of_channels, samples_of, set_read_only_state
 from kineme.validation import Array
 
 _DEGREES = 360.0  # what angles without a unit wrap by that are too large for radians
@@ -155,6 +155,8 @@ class DiscreteSteps:
     values: Array  # (m, c), values of the c columns: of each movement at its start, and wherever one changes
     shares: Array  # (m,), when, as a share of the duration: 0 at the start of each movement, 1 at its end
     offsets: NDArray[np.intp]  # (n + 1,), movement i has the steps ``offsets[i]:offsets[i + 1]``
+
+    __setstate__ = set_read_only_state
 
     def __post_init__(self) -> None:
         make_read_only(self, ("values", "shares", "offsets"))

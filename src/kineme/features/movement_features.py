@@ -15,8 +15,10 @@ from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.pose.tangent import as_poses, to_tangent
 from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import axis_names
+from kineme.movements.trajectories.movements import axis_names, in_coordinates
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.validation import check_choice, check_count, check_number
 
@@ -26,7 +28,7 @@ FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any
     "forcing": lambda primitives, n_samples: primitives.forcing(n_samples),
     "weights": lambda primitives, _: primitives.weights,
 }
-_NESTED = "dmp__"
+_NESTED, _FEATURES = "dmp__", "features__"
 
 Specification = TypeVar("Specification", DMP, RhythmicDMP)
 
@@ -56,6 +58,7 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
     _specification_type: ClassVar[type]  # of the specification
     dmp_: Specification
     n_dims_: int
+    channels_: Channels | None
 
     def __init__(
         self,
@@ -100,33 +103,34 @@ class MovementFeatures(_TakesMovements, Generic[Specification]):
         return self
 
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
-        """Check the parameters and store the number of dimensions; y is ignored."""
+        """Check the parameters and store what the dimensions are; y is ignored."""
         check_choice("feature", self.feature, list(FEATURES))
         check_count("n_samples", self.n_samples, 2)
         check_choice("dtype", self.dtype, ("float64", "float32"))
+        self.feature_, self.n_samples_, self.dtype_ = self.feature, self.n_samples, self.dtype
         self.dmp_ = self._specification()
-        self.n_dims_ = Demonstrations.of(X).n_dims
+        demonstrations = Demonstrations.of(X)
+        self.channels_ = demonstrations.channels
+        self.n_dims_ = in_coordinates(demonstrations.movements).positions.shape[1]
         return self
 
     def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
+        Columns that are known are put in the order and converted to the units of those of `fit`.
+
         Raises `TrajectoryError`: movements that cannot be used, or of other dimensions than those of `fit`. Raises
         `DegenerateMovementError`: weights or forcing in the original formulation where ``g = x0``.
         """
         check_is_fitted(self)
-        demonstrations = Demonstrations.of(X)
-        if demonstrations.n_dims != self.n_dims_:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims_} dimensions as in fit, got {demonstrations.n_dims}; "
-                "fit again, or select the dimensions by columns= of read_recordings, in the shell --columns"
-            )
-        return features_of(self.dmp_.learn(demonstrations), self.feature, self.n_samples).astype(self.dtype, copy=False)
+        demonstrations = as_learned(X, self.channels_, self.n_dims_)
+        rows = features_of(self.dmp_.learn(demonstrations), self.feature_, self.n_samples_)
+        return rows.astype(self.dtype_, copy=False)
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Names x_1 ... x_S, y_1 ... y_S; beyond three dimensions q1_1 ... q1_S, q2_1 ..."""
         check_is_fitted(self)
-        size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
+        size = self.dmp_.n_basis if self.feature_ == "weights" else self.n_samples_
         names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
         return np.array(names, dtype=object)
 
@@ -170,8 +174,12 @@ class DMPFeatures(MovementFeatures[DMP]):
     ----------
     dmp_ : DMP
         The specification in force.
+    feature_, n_samples_, dtype_
+        The parameters in force, those of `fit`.
     n_dims_ : int
         Dimensions d of the training movements.
+    channels_ : tuple of Channel or None
+        What they are, where that is known.
 
     Examples
     --------
@@ -207,8 +215,12 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     dmp_ : RhythmicDMP
         The specification in force. Unless `align_on` is given, it is the dimension with the largest first harmonic in
         most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
+    feature_, n_samples_, dtype_
+        The parameters in force, those of `fit`.
     n_dims_ : int
         Dimensions d of the training movements.
+    channels_ : tuple of Channel or None
+        What they are, where that is known.
     """
 
     _specification_type: ClassVar[type] = RhythmicDMP
@@ -243,8 +255,12 @@ class PoseFeatures(_TakesMovements):
     ----------
     features_ : DMPFeatures
         The fitted transformer behind it.
+    orientation_weight_ : float
+        The weight in force, that of `fit`.
     n_columns_ : int
         4 for orientations, 7 for poses.
+    channels_ : tuple of Channel or None
+        What the columns are, where one of them is known to be an orientation.
 
     Notes
     -----
@@ -258,11 +274,31 @@ class PoseFeatures(_TakesMovements):
         self.features = features
         self.orientation_weight = orientation_weight
 
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters by name; with `deep` also those of `features`, as ``features__n_samples`` and so on."""
+        parameters = super().get_params(deep)
+        if deep and self.features is None:
+            parameters |= {_FEATURES + name: value for name, value in DMPFeatures().get_params().items()}
+        return parameters
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters by name; ``features__n_samples`` and so on set those of `features`, which are made if need be.
+
+        Raises `ValueError`: a name that is no parameter. Raises `SpecificationError`: a value out of the range of a
+        field.
+        """
+        if parameters.get("features", self.features) is None and any(name.startswith(_FEATURES) for name in parameters):
+            parameters["features"] = DMPFeatures()
+        return super().set_params(**parameters)
+
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
+        self.orientation_weight_ = float(self.orientation_weight)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
-        demonstrations = as_poses(X)
+        given = Demonstrations.of(X)
+        self.channels_ = None if given.channels is None or is_plain(given.channels) else given.channels
+        demonstrations = as_poses(given)
         self.n_columns_ = demonstrations.n_dims
         self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
         self.features_.set_params(dmp__preprocessing=())  # applied in to_tangent, before the goal is read
@@ -275,7 +311,8 @@ class PoseFeatures(_TakesMovements):
         Raises `TrajectoryError`: movements that cannot be used, or orientations where `fit` saw poses.
         """
         check_is_fitted(self)
-        demonstrations = as_poses(X)
+        known = X if self.channels_ is None else as_learned(X, self.channels_, len(learned_names(self.channels_)))
+        demonstrations = as_poses(known)
         if demonstrations.n_dims != self.n_columns_:
             raise TrajectoryError(
                 f"expected movements of {self.n_columns_} columns as in fit, got {demonstrations.n_dims}; fit again"
@@ -293,6 +330,6 @@ class PoseFeatures(_TakesMovements):
         tangent, _ = to_tangent(demonstrations, self.steps_)
         if tangent.n_dims == 3:
             return tangent
-        weights = np.repeat([1.0, float(self.orientation_weight)], 3)
+        weights = np.repeat([1.0, self.orientation_weight_], 3)
         weighted = replace(tangent.movements, positions=tangent.positions * weights)
         return Demonstrations.of_movements(weighted, tangent.steps)

@@ -215,7 +215,8 @@ def checked_rows(X: ArrayLike, name: str = "X") -> Rows:
     if rows.ndim != 2:
         raise SpecificationError(
             f"expected {name} to be two-dimensional (rows, features), got shape {rows.shape}; "
-            "pass a single row x as x[np.newaxis]"
+            "pass a single row x as x[np.newaxis], and to models of scikit-learn that call a kernel pair by pair, as "
+            "KernelPCA does, kernel='precomputed' and the matrix kernel.fit(X)(X)"
         )
     if rows.shape[1] == 0:
         raise SpecificationError(f"expected {name} with at least one column, got shape {rows.shape}")

@@ -14,7 +14,7 @@ import traitlets
 from numpy.typing import ArrayLike
 
 from kineme.dmp.discrete.dmp import Primitives
-from kineme.errors import DataError, SpecificationError
+from kineme.errors import DataError, SpecificationError, TrajectoryError
 from kineme.library.library import ActionLibrary
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
@@ -191,6 +191,13 @@ class Move(_Page):
         """The primitive that is chosen in the cell."""
         return self.primitives[self._names.index(self.moved["name"])]
 
+    @property
+    def path(self) -> Trajectory:
+        """The movement in the cell, with the label and the name of its primitive."""
+        labels, names = self.primitive.labels, self.primitive.names
+        label, name = None if labels is None else labels.tolist()[0], None if names is None else names[0]
+        return Trajectory(self._moving("times"), self._moving("positions"), label, name)
+
     def place(self, *, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> None:
         """Put the start or the goal (d,) elsewhere, as a hand does in the cell, which shows it; via points stay.
 
@@ -199,6 +206,8 @@ class Move(_Page):
         start, goal = (self.start if start is None else start), (self.goal if goal is None else goal)
         via = list(map(tuple, self.moved["via"])) or None
         rollout = self.primitive.rollout(start=start, goal=goal, via=via, n_samples=N_POINTS)
+        if len(rollout) != 1:
+            raise TrajectoryError(f"expected a start and a goal of one movement, got {len(rollout)} of them")
         place = {"start": np.ravel(start).astype(float), "goal": np.ravel(goal).astype(float)}
         place |= {"times": rollout.times[0], "positions": rollout.positions[0]}
         self.moved = self.moved | {name: array.tolist() for name, array in place.items()}

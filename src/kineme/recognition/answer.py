@@ -25,7 +25,7 @@ from kineme.similarity.describe import Described
 from kineme.similarity.scores import Classifier, Compared, for_compared, score
 from kineme.similarity.similarity import AveragedSimilarity
 from kineme.similarity.specification import ComparisonSpecification
-from kineme.validation import Array
+from kineme.validation import Array, as_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -280,7 +280,8 @@ class Answer:
 
 def is_one(X: MovementsLike) -> bool:
     """Tell whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
-    return isinstance(X, Trajectory) or (isinstance(X, np.ndarray) and X.dtype != object and X.ndim <= 2)
+    given = as_array(X)
+    return isinstance(X, Trajectory) or (isinstance(given, np.ndarray) and given.dtype != object and given.ndim <= 2)
 
 
 def known_labels(

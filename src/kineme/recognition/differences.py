@@ -21,7 +21,7 @@ from kineme.recognition.explanation import Explanation
 from kineme.recognition.recognizer import Recognizer
 from kineme.reporting.page import inline
 from kineme.reporting.table import data_frame
-from kineme.reporting.text import counted, drawable, shortened
+from kineme.reporting.text import counted, drawable, first_names, shortened
 from kineme.validation import check_count
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _NEW = "new"  # the answer to a movement that is called unknown
 _DRAWN, _NAME = 40, 24  # classes of a figure, and letters of their names
+_NAMED = 3  # classes in a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +168,8 @@ def confusion(
     Raises
     ------
     SpecificationError
-        One group only, or, without groups, a class of one movement.
+        One group only, a class whose groups are all left out at once, as where it has one, or, without groups, a class
+        of one movement.
     TrajectoryError
         Not one label, or not one group, for each movement.
     """
@@ -191,7 +193,14 @@ def confusion(
         splitter = LeaveOneGroupOut() if n_folds == n_parts else GroupKFold(n_folds)
     answers = np.empty(len(demos), dtype=np.intp)
     index_of = {label: c for c, label in enumerate(classes.tolist())}
-    for train, test in splitter.split(np.zeros(len(demos)), truth, numbers):
+    parts = list(splitter.split(np.zeros(len(demos)), truth, numbers))
+    if lost := sorted({c for train, test in parts for c in np.setdiff1d(truth[test], truth[train]).tolist()}):
+        raise SpecificationError(
+            "expected each class in groups of which some stay to learn from, got all groups of a class left out: "
+            f"{first_names(classes[lost].tolist(), _NAMED)}; leave the class out, record it with others, or leave one "
+            "group out at a time, without folds="
+        )
+    for train, test in parts:
         known_groups = None if numbers is None or error_rate is None else numbers[train]
         fitted = clone(recognizer or Recognizer()).fit(demos[train], labels[train], known_groups)
         given = fitted.predict(demos[test]) if error_rate is None else fitted.predict_known(demos[test], error_rate)
@@ -230,10 +239,16 @@ def compare(movement: MovementLike, other: MovementLike, recognizer: Recognizer 
         )
     called = [(each[0].name, each[0].label, default) for each, default in zip(both, ("first", "second"), strict=True)]
     names = [str(next(name for name in each if name is not None)) for each in called]
-    answer = clone(recognizer or Recognizer()).fit(both[1], [names[1]]).recognize(both[0][0])
+    one_class = clone(recognizer or Recognizer()).set_params(classifier="nearest")  # a support vector machine needs two
+    answer = one_class.fit(both[1], [names[1]]).recognize(both[0][0])
     transform = answer.transform
-    turned, sizes = math.degrees(transform.angle), np.unique(transform.scale.round(2))
-    how = [f"{' by '.join(f'{size:g}' for size in sizes)} times as large"]
+    turned, sizes = math.degrees(transform.angle), [*map(_rounded, transform.scale.tolist())]
+    how = [f"{' by '.join(sizes[:1] if len({*sizes}) == 1 else sizes)} times as large"] * (one_class.scale != "none")
     how += [f"turned by {turned:.0f} degrees"] * (abs(turned) >= 0.5)
-    how += [f"{1 / transform.duration_ratio:.2f} times as fast"]
+    how += [f"{_rounded(1 / transform.duration_ratio)} times as fast"]
     return replace(answer.explain(), answer=f"{names[0]} beside {names[1]} ({', '.join(how)})")
+
+
+def _rounded(factor: float) -> str:
+    """Three digits of a factor of any size, as 0.001 or 1,230."""
+    return f"{float(f'{factor:.3g}'):,g}"

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
+from kineme.errors import TrajectoryError
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -292,7 +293,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:
         """Return the share recognized as what they are; labels `y` are by default those of the demonstrations."""
         demos = Demonstrations.of(X)
-        return float(super().score(demos, check_labels(demos, y), sample_weight))
+        labels, answers = check_labels(demos, y), self.predict(demos)
+        if isinstance(labels[0], str) != isinstance(answers[0], str):
+            raise TrajectoryError(f"expected labels as those of fit, such as {answers[0]!r}, got {labels[0]!r}")
+        return float(np.average(answers == labels, weights=sample_weight))
 
     @overload
     def recognize(self, X: Trajectory | NDArray[Any], error_rate: float = 0.05) -> Answer: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import torch
@@ -10,6 +11,8 @@ from torch import Tensor
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.torch.primitive import Primitive
 from kineme.validation import check_number
+
+_ROUNDING = 1e-3  # of a step: a time that is rounded to single precision is at its sample
 
 
 class ActionChunk(torch.nn.Module):
@@ -147,8 +150,15 @@ class Trajectories:
         """Set the state (..., d) from which the movement goes on at a time [s], the same for all of a batch.
 
         The first state after a reset is the start from which the shape counts.
+
+        Raises `SpecificationError`: times that differ.
         """
-        self._initial = (self._tensor(init_time).reshape(-1)[0], self._tensor(init_pos), self._tensor(init_vel))
+        times = self._tensor(init_time).reshape(-1)
+        if bool((times != times[0]).any()):
+            raise SpecificationError(
+                f"expected the same initial time for all of a batch, got {times.tolist()}; go on with each time apart"
+            )
+        self._initial = (times[0], self._tensor(init_pos), self._tensor(init_vel))
         self._start = self._initial[1] if self._start is None else self._start
 
     def set_duration(self, duration: float | None, dt: float) -> None:
@@ -183,5 +193,5 @@ class Trajectories:
             numbers[..., :-1], at=time, position=position, velocity=velocity, goal=numbers[..., -1], start=self._start,
             derivative=derivative,
         )  # fmt: skip
-        first = round(float(time / self._primitive.duration.max()) * (self._primitive.n_samples - 1)) + 1
-        return path[..., first:, :]
+        steps = float(time / self._primitive.duration.max()) * (self._primitive.n_samples - 1)
+        return path[..., math.floor(steps + _ROUNDING) + 1 :, :]

@@ -319,7 +319,8 @@ class Primitive(torch.nn.Module):
         rest = torch.zeros_like(position)
         numbers, tau = self._numbers(weights, origin, goal, rest, duration)
         u = self._number(at) / tau
-        now = torch.stack((position, self._vector("velocity", velocity) * tau[..., None]), dim=-1)
+        speed = self._vector("velocity", velocity) * tau[..., None]
+        now = torch.stack(torch.broadcast_tensors(position, speed), dim=-1)
         h = self._u - u[..., None]
         free = self._transition(h.clamp(min=0.0))  # (..., T, 2, 2)
         driven = self._path(numbers, tau, derivative)
@@ -415,6 +416,7 @@ class Primitive(torch.nn.Module):
         """
         check_number("noise", noise, above=0.0)
         self._relative(positions)  # which checks them
+        positions = positions.to(self._u.dtype)
         start = positions[..., 0, :] if start is None else start
         goal = positions[..., -1, :] if goal is None else goal
         residual = (positions - self(mean, start, goal, velocity=velocity, duration=duration)).mT  # (..., d, T)
@@ -474,7 +476,7 @@ class Primitive(torch.nn.Module):
                 "kineme.Resample makes movements of one length"
             )
         x = positions.to(self._u.dtype).mT
-        return x - x[..., :1], positions[..., -1, :]
+        return x - x[..., :1], x[..., -1]
 
     @property
     def counts_per_distance(self) -> bool:
@@ -524,7 +526,7 @@ class Primitive(torch.nn.Module):
         amplitude = g - x0
         distance = self._distance(amplitude)
         w = w if distance is None else w * distance[..., None]
-        vectors = torch.stack(torch.broadcast_tensors(amplitude, v0, x0), dim=-1)
+        vectors = torch.stack(torch.broadcast_tensors(amplitude, v0, x0, tau[..., None])[:3], dim=-1)
         if w.shape[:-1] != vectors.shape[:-1]:
             batch = torch.broadcast_shapes(w.shape[:-2], vectors.shape[:-2])
             w, vectors = (part.expand(*batch, *part.shape[-2:]) for part in (w, vectors))

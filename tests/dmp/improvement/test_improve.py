@@ -177,3 +177,20 @@ def test_a_progress_bar_if_asked_for(capsys):
     assert capsys.readouterr().err == ""
     improve(reach(DMP()), far_from([0.5, 0.5]), updates=2, progress=True)
     assert "improving" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("formulation", ["bio-inspired", "original"])
+def test_the_primitive_has_the_start_goal_and_duration_that_were_tried(formulation, make_movement):
+    t, x = make_movement(1, 2)
+    primitive = DMP(formulation).learn(kineme.Trajectory(t, x))
+    given = {"start": x[0] + 0.1, "goal": x[-1] + [0.3, 0.2], "duration": 3.0}
+
+    def cost(rollout):
+        far = np.linalg.norm(rollout.positions[:, -1] - given["goal"], axis=1)
+        return far + 1e-3 * np.abs(rollout.accelerations).mean(axis=(1, 2))
+
+    found = improve(primitive, cost, updates=3, rollouts=6, **given)
+    assert found.costs[0, 0] == pytest.approx(cost(primitive.rollout(**given))[0])
+    np.testing.assert_allclose(cost(found.primitive.rollout()), found.cost)
+    np.testing.assert_array_equal(found.primitive.goals[0], given["goal"])
+    assert found.primitive.durations.tolist() == [3.0]

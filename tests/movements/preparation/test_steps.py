@@ -132,6 +132,16 @@ def test_trimming_keeps_the_stamps_of_what_is_left(make_movement):
     assert len(t) == 100
 
 
+@pytest.mark.parametrize("even", [True, False])
+def test_steps_keep_the_origin_of_time(make_movement, even):
+    t, x = make_movement(0, even=even)
+    demos = Demonstrations.from_arrays([x, x], times=[t, t + 10])
+    after = preprocess(demos, [Smooth(), Resample(50)])
+    assert [movement.times[0] for movement in after] == [t[0], t[0] + 10]
+    assert [movement.times[-1] for movement in after] == [t[-1], t[-1] + 10]
+    assert after.even_length == 50
+
+
 def test_a_still_movement_is_left_as_it_is():
     demos = Demonstrations.from_arrays([np.ones((20, 2)), np.linspace(0, 1, 20)[:, None] * [1, 1]])
     assert preprocess(demos, [TrimRest()]).lengths[0] == 20

@@ -121,7 +121,6 @@ REFUSED = {
     "no rows": (_frame()[:0], "expected samples, got a data frame without rows"),
     "time that stands still": (_frame(time=0.0), "trajectory 0: expected strictly increasing times"),
     "other coordinates": ([_frame(), _frame().rename(columns={"y": "z"})], r"data frame 1: expected the coordinates \['x', 'y'\] as in data frame 0, got \['x', 'z'\]"),
-    "frames beside arrays": ([_frame(), np.ones((9, 2))], "expected data frames, got ndarray at index 1"),
     "numbers that are words": (_frame().astype(str), r"expected numbers in the column 'x', got '0.0' in row 0; repair it, as by frame.astype"),
     "one column alone": (_frame()["x"], r"expected movements as a list of .*, got Series; pass its numbers, series.to_numpy\(\)"),
     "times that are words": (_frame(time="now"), "expected numbers or dates in the column of times 'time', got the text 'now'"),
@@ -132,6 +131,11 @@ REFUSED = {
 def test_what_cannot_be_understood_is_refused(frame, message):
     with pytest.raises(TrajectoryError, match=message):
         kineme.DMP().learn(frame)
+
+
+def test_arrays_are_no_data_frames():
+    with pytest.raises(TrajectoryError, match="expected data frames, got ndarray at index 1"):
+        Demonstrations.from_dataframe([_frame(), np.ones((9, 2))])
 
 
 def test_frames_of_another_package_need_names_only():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
 from collections import deque
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kineme import Demonstrations, Trajectory
+from kineme import DMP, Demonstrations, Trajectory
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.demonstrations import require_labels
 
@@ -80,6 +82,14 @@ def test_blocks_cannot_be_written(demos):
         demos[0].positions,
         demos[0].times,
     ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = array[-1]
+
+
+@pytest.mark.parametrize("copy", [deepcopy, lambda whole: pickle.loads(pickle.dumps(whole))])
+def test_copies_cannot_be_written(demos, copy):
+    primitives = copy(DMP().learn(demos))
+    for array in (copy(demos).positions, copy(demos)[0].times, copy(demos[0]).positions, primitives.goals):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = array[-1]
 

@@ -31,6 +31,44 @@ def test_one_flat_array_is_one_movement_of_one_dimension():
     _same(Demonstrations.of(X[:, 0]), Demonstrations.from_arrays([X[:, :1]]))
 
 
+class _Tensor:
+    """An array as PyTorch has them: it iterates over its rows, and does not convert while it has gradients."""
+
+    def __init__(self, values, has_gradients=True):
+        self.values, self.has_gradients = values, has_gradients
+        self.ndim, self.shape = values.ndim, values.shape
+
+    def __len__(self):
+        return len(self.values)
+
+    def __getitem__(self, i):
+        return _Tensor(self.values[i])
+
+    def detach(self):
+        return _Tensor(self.values, has_gradients=False)
+
+    def __array__(self, dtype=None, copy=None):
+        if self.has_gradients:
+            raise RuntimeError("Can't call numpy() on Tensor that requires grad")
+        return np.asarray(self.values, dtype)
+
+
+@pytest.mark.parametrize("convert", [_Tensor, memoryview, lambda x: x.astype(object)])
+def test_arrays_of_any_package_are_what_arrays_of_numpy_are(convert, letters, recognizer):
+    for array in (X, X[:, 0].copy(), np.stack([X, 2 * X])):
+        _same(Demonstrations.of(convert(array)), Demonstrations.of(array))
+        _same(Demonstrations.from_arrays(convert(array), times=convert(T)), Demonstrations.from_arrays(array, times=T))
+    _same(Demonstrations.of([convert(X)]), Demonstrations.of([X]))
+    assert recognizer.recognize(convert(letters[3].positions)).label == letters[3].label
+
+
+def test_an_array_that_does_not_convert_is_refused_in_words():
+    tensor = _Tensor(X)
+    tensor.detach = lambda: tensor
+    with pytest.raises(TrajectoryError, match="expected an array of numbers, got Can't call numpy"):
+        Demonstrations.of(tensor)
+
+
 def test_a_list_is_always_many_movements():
     assert len(Demonstrations.of([X[:, 0], X[:, 1]])) == 2
     assert len(Demonstrations.of([X[:, 0].tolist(), X[:, 1].tolist()])) == 2
@@ -45,6 +83,22 @@ def test_lists_of_what_holds_movements_are_one_after_the_other():
     assert demos.names == ("one", "one", "two", "one", "two")
     _same(demos[[3, 4]], pair)
     _same(Demonstrations.of(held), pair)
+
+
+@pytest.mark.parametrize("form", ["collections", "blocks", "lists", "lists of arrays", "objects", "frames"])
+def test_lists_may_hold_any_form(form):
+    demos = Demonstrations.of(np.stack([X, 2 * X]))
+    first, second = demos
+    frame = Demonstrations.of([first]).to_pandas()
+    given = {
+        "collections": [demos, demos],
+        "blocks": [np.stack([X, 2 * X])] * 2,
+        "lists": [[first, second], (first, second)],
+        "lists of arrays": [[X, 2 * X]] * 2,
+        "objects": np.array([first, second, first, second], dtype=object),
+        "frames": [frame, second, frame, second],
+    }
+    np.testing.assert_array_equal(Demonstrations.of(given[form]).positions, np.concatenate([X, 2 * X] * 2))
 
 
 def test_names_of_files_are_no_movements():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
 
 RAGGED = kineme.Demonstrations.from_arrays(
@@ -58,6 +59,12 @@ def test_pandas_is_asked_for_where_it_is_missing(monkeypatch):
         kineme.errors.DataError, match="expected the package pandas for a data frame; pip install pandas"
     ):
         RAGGED.to_pandas()
+
+
+def test_nothing_to_draw_is_said():
+    primitives = kineme.DMP().learn(np.random.default_rng(0).random((3, 5, 1)))[[]]
+    with pytest.raises(TrajectoryError, match="expected at least one movement to draw, got none"):
+        primitives.plot()
 
 
 def test_a_notebook_shows_a_row_for_each_label_and_runs_nothing():

@@ -51,12 +51,15 @@ class Resample:
 def along(demonstrations: Demonstrations, rows: Array) -> Movements:
     """The same movements along other, evenly sampled paths (n, d, T) relative to their starts."""
     n, d, n_samples = rows.shape
-    starts = demonstrations.positions[demonstrations.offsets[:-1]]
+    first, last = demonstrations.offsets[:-1], demonstrations.offsets[1:] - 1
+    starts, times = demonstrations.positions[first], demonstrations.movements.times
+    if times is not None:  # without, they begin at 0
+        times = np.linspace(times[first], times[last], n_samples, axis=1).ravel() if times[first].any() else None
     return replace(
         demonstrations.movements.positions_only,
         positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, d),
         offsets=np.arange(n + 1) * n_samples,
-        times=None,
+        times=times,
     )
 
 

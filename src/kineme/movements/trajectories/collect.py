@@ -20,6 +20,7 @@ from kineme.validation import (
     MIN_SAMPLES,
     ROUNDED,
     Array,
+    as_array,
     as_positions,
     as_times,
     check_extents,
@@ -109,6 +110,7 @@ def collect_arrays(
     copy: bool,
 ) -> Movements:
     """Concatenate arrays and check them all at once; see `Demonstrations.from_arrays`."""
+    arrays = as_array(arrays)
     is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
     if names is not None:
         _check_sized(names, "names as a list, one for each movement")
@@ -232,6 +234,7 @@ def _concatenate_times(
     times: Sequence[ArrayLike] | Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None
 ) -> Array:
     n, lengths = len(offsets) - 1, np.diff(offsets)
+    times = as_array(times, "times")
     if isinstance(times, np.ndarray) and times.dtype != object and times.ndim == 1:
         times = [times] * n
     _check_sized(times, "times as a list of (T,) arrays or one (T,) array")

@@ -20,11 +20,10 @@ from kineme.movements.trajectories.labels import as_indices, label_array
 from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
-from kineme.validation import Array, describe
+from kineme.validation import Array, as_array, describe
 
 _SHOWN = 8  # names of dimensions
 _NESTED = 8  # records around movements; more are a mistake, such as a stand-in that has every attribute
-_ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
 
 class Demonstrations(Presented, Sequence[Trajectory]):
@@ -142,8 +141,8 @@ class Demonstrations(Presented, Sequence[Trajectory]):
             - One `Trajectory`, or one array of shape (T, d) or (T,): one movement.
             - One array of shape (n, T, d): n movements, used without a copy.
             - One data frame of pandas or polars, see `from_dataframe`; or the groups of one, as ``groupby`` makes them.
-            - A list of `Trajectory`, of (T_i, d) arrays, or of anything above. A list is always many movements, also
-              one of plain numbers in lists.
+            - A list of `Trajectory`, of (T_i, d) arrays, or of anything above, mixed or in lists of their own. A list
+              is always many movements, also one of plain numbers in lists.
 
             Movements without time stamps are taken as evenly sampled over one second.
 
@@ -159,11 +158,13 @@ class Demonstrations(Presented, Sequence[Trajectory]):
             return cls.of(held)
         if (frames := frames_of(movements)) is not None:
             return cls.from_dataframe(frames)
-        several: Any = [movements] if isinstance(movements, Trajectory) else movements
-        if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
-            if any(map(is_data_frame, several)):
+        several: Any = [movements] if isinstance(movements, Trajectory) else as_array(movements)
+        if isinstance(several, np.ndarray) and several.dtype == object:
+            several = several.tolist()
+        if isinstance(several, Sequence):
+            if several and all(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
-            if any(isinstance(movement, Trajectory) or hasattr(movement, "demonstrations") for movement in several):
+            if any(map(_holds_movements, several)):
                 return cls(one_by_one(several, lambda held: [held] if isinstance(held, Trajectory) else cls.of(held)))
         return cls.from_arrays(several, copy=False)
 
@@ -295,6 +296,17 @@ def _held_by(movements: Any) -> Any:
         f"expected movements, got {type(movements).__name__}, whose demonstrations have demonstrations without end; "
         "pass Demonstrations, a list of Trajectory, or arrays"
     )
+
+
+def _holds_movements(item: Any) -> bool:
+    """Tell whether an item of a list is more than one array (T, d) of numbers."""
+    if isinstance(item, np.ndarray) and item.dtype == object:
+        item = item.tolist()
+    if isinstance(item, (list, tuple)):
+        return len(item) > 0 and (getattr(item[0], "ndim", 0) == 2 or _holds_movements(item[0]))
+    if getattr(item, "ndim", 0):
+        return item.ndim == 3
+    return isinstance(item, (Trajectory, Demonstrations)) or hasattr(item, "demonstrations") or is_data_frame(item)
 
 
 def one_by_one(several: Sequence[Any], convert: Callable[[Any], Iterable[Trajectory]]) -> list[Trajectory]:

@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.movements import Samples
 from kineme.reporting.colors import BLUE, GRAY, GREEN, ORANGE, PURPLE
 from kineme.reporting.figures import figure_to_show
@@ -98,6 +98,8 @@ def draw_movements_into(axes: Axes, samples: Samples) -> None:
 
 def _choose(samples: Samples) -> _Drawn:
     n, labels = len(samples.offsets) - 1, samples.labels
+    if n == 0:
+        raise TrajectoryError("expected at least one movement to draw, got none; choose some")
     chosen = np.arange(0, n, math.ceil(n / _MOST))
     movements = [slice(samples.offsets[i], samples.offsets[i + 1]) for i in chosen]
     distinct = [] if labels is None else list(dict.fromkeys(labels[chosen].tolist()))

@@ -33,6 +33,14 @@ _EVEN = 1e-9  # stamps off an even grid by less than this share of a step count 
 _SAMPLES_AT_ONCE = 65_536  # stamps checked at a time: uneven ones are found early, and temporaries stay in the cache
 
 
+def set_read_only_state(record: Any, state: dict[str, Any]) -> None:
+    """Give a copied or unpickled record its arrays, which nobody can write to: NumPy forgets that on the way."""
+    for value in state.values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    vars(record).update(state)
+
+
 @dataclass(frozen=True, eq=False)
 class Movements:
     """The block behind `Demonstrations`: validated, contiguous, read-only.
@@ -51,6 +59,8 @@ class Movements:
     dimensions: tuple[str, ...] | None = None  # what the d columns are called, where that is known
     channels: Channels | None = None  # what was recorded, where that is known
     recorded: Array | None = None  # (total, columns of the channels); None where it is the positions
+
+    __setstate__ = set_read_only_state
 
     def __post_init__(self) -> None:
         for field in ("positions", "offsets", "durations", "times", "labels", "recorded"):

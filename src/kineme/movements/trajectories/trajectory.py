@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, learned_names, recorded_names
-from kineme.movements.trajectories.movements import Samples, axis_names
+from kineme.movements.trajectories.movements import Samples, axis_names, set_read_only_state
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.validation import Array, as_positions, as_times, check_extents, check_finite, check_times
 
@@ -56,6 +56,8 @@ class Trajectory(Presented):
     name: str | None = None
     channels: Channels | None = field(default=None, init=False)
     recorded: Array = field(init=False)
+
+    __setstate__ = set_read_only_state
 
     def __post_init__(self) -> None:
         if getattr(self.name, "__hash__", None) is None:
