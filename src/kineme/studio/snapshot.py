@@ -124,18 +124,16 @@ def recognition_parts(classes: KnownClasses) -> Snapshot:
 
 def _columns(channels: Channels | None) -> list[dict[str, Any]] | None:
     """Write the heads of the coordinates, with their units, and what angles wrap by; None where they have no names."""
-    return (
-        None
-        if channels is None
-        else [
-            {
-                "head": f"{name} [{channel.unit}]" if channel.unit and unit_of(name) is None else name,
-                "period": (period_by_unit(channel.unit) or channel.period or None) if channel.kind == "angle" else None,
-            }
-            for channel in channels
-            for name in channel.coordinates
-        ]
-    )
+    if channels is None:
+        return None
+    return [
+        {
+            "head": f"{name} [{channel.unit}]" if channel.unit and unit_of(name) is None else name,
+            "period": (period_by_unit(channel.unit) or channel.period or None) if channel.kind == "angle" else None,
+        }
+        for channel in channels
+        for name in channel.coordinates
+    ]
 
 
 def _comparison(how: Comparison, pairs: Pairs | None, arrays: _Arrays) -> dict[str, Any]:

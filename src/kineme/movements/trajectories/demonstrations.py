@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -164,7 +165,7 @@ class Demonstrations(Presented, Sequence[Trajectory]):
         if isinstance(several, Sequence):
             if several and all(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
-            if any(map(_holds_movements, several)):
+            if any(map(_holds_movements, [] if _are_paths(several) else several)):
                 return cls(one_by_one(several, lambda held: [held] if isinstance(held, Trajectory) else cls.of(held)))
         return cls.from_arrays(several, copy=False)
 
@@ -296,6 +297,11 @@ def _held_by(movements: Any) -> Any:
         f"expected movements, got {type(movements).__name__}, whose demonstrations have demonstrations without end; "
         "pass Demonstrations, a list of Trajectory, or arrays"
     )
+
+
+def _are_paths(items: Sequence[Any]) -> bool:
+    """Tell at once of a list, which may be long, that it holds nothing but arrays (T, d)."""
+    return set(map(type, items)) == {np.ndarray} and set(map(attrgetter("ndim"), items)) == {2}
 
 
 def _holds_movements(item: Any) -> bool:
