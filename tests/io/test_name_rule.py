@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme.errors import SpecificationError
+from kineme.io.reading.merge_files import each_person
 from kineme.io.reading.recordings import NameRule, match
 
 PATTERN = "{person}_{label}_{n}.csv"
@@ -43,6 +44,16 @@ def test_a_pattern_with_a_person_alone_leaves_the_labels(tmp_path):
     _write(tmp_path / "wave" / "ann-1.csv")
     read = kineme.read_recordings(tmp_path, label_pattern="{person}-{n}.csv")
     assert (read.labels.tolist(), read.people) == (["wave"], ["ann"])
+
+
+def test_the_person_is_the_folder_beside_that_of_the_label(tmp_path):
+    for k, person in enumerate(("ann", "bob")):
+        _write(tmp_path / "label first" / "wave" / person / "1.csv", k + 1)
+        _write(tmp_path / "person first" / person / "wave" / "1.csv", k + 1)
+    for name, by in (("label first", 2), ("person first", None)):
+        read = kineme.read_recordings(tmp_path / name, label_by=by)
+        assert read.labels.tolist() == ["wave", "wave"]
+        assert each_person(tmp_path / name, read.sources) == ["ann", "bob"]
 
 
 def test_labels_by_level_folder_or_task(tmp_path):

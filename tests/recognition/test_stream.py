@@ -134,6 +134,9 @@ def test_place_size_and_direction_do_not_change_what_is_said(recognizer, movemen
     [
         (np.nan, [0.0, 0.0], LiveStatus.NOT_FINITE),
         (9.0, [0.0, np.inf], LiveStatus.NOT_FINITE),
+        (9.0, [0.0, 1e308], LiveStatus.NOT_FINITE),
+        (1e60, [0.0, 0.0], LiveStatus.NOT_FINITE),
+        (9.0, np.ma.masked_array([0.0, 1e4], [False, True]), LiveStatus.NOT_FINITE),
         (-1.0, [0.0, 0.0], LiveStatus.TIME_NOT_INCREASING),
         (0.0, [0.0, 0.0], LiveStatus.TIME_NOT_INCREASING),
         (9.0, [0.0, 0.0, 0.0], LiveStatus.WRONG_SHAPE),

@@ -44,6 +44,7 @@ TABLES = {
     "audacity.txt": ("0.5\t1.75\twave\n\\\t100.0\t200.0\n2.000000\t4.000000\tnod\n", True),
     "underscores.csv": ("start_ms,end_ms,label\n500,1750,wave\n2000,4000,nod\n", False),
     "seconds.csv": ("start_s,end_s,end_effector,label\n0.5,1.75,1,wave\n2,4,1,nod\n", False),
+    "who.csv": ("event,name,start,end,label\n1,bob,0.5,1.75,wave\n2,ann,2,4,nod\n", False),
     "objects.json": (json.dumps([dict(zip(("start", "end", "label"), span, strict=True)) for span in SPANS]), False),
     **{f"elan-{name}.txt": (text, True) for name, text in ELAN.items()},
 }
@@ -111,6 +112,13 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     (tmp_path / "l.csv").write_text("start,end,label\n2000,2001,wave\n")
     with pytest.raises(DataError, match="found none; the first that is none"):
         labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+
+
+def test_a_mark_without_length_is_a_problem_beside_labels_that_are_read(tmp_path, recordings):
+    (tmp_path / "labels.txt").write_text("1.0\t1.0\tmark\n2.0\t4.0\tnod\n")
+    pieces = labeled_pieces(recordings, read_labels(tmp_path / "labels.txt"))
+    assert pieces.labels.tolist() == ["nod"]
+    assert [problem.line for problem in pieces.problems] == [1]
 
 
 def test_rows_of_recordings_that_are_not_there_are_a_problem(tmp_path, recordings):

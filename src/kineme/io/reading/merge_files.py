@@ -259,6 +259,8 @@ def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
 def _person(source: Source, listed: list[str] | None) -> str | None:
     if listed is None:
         folders = PurePosixPath(source.path).parts
+        if source.label in folders[:-2] and source.label != folders[-2]:  # label/person/recording
+            return folders[folders.index(source.label) + 1]
         return folders[-_DEPTH] if len(folders) >= _DEPTH else None
     index = int(source.place or 0)
     if index >= len(listed):

@@ -33,11 +33,10 @@ _START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")
 _END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
 _LAST_WORD = re.compile(rf"(?<![.a-zµμ])({_TIMES})\W*$")  # that of hh:mm:ss.ms says how a clock is written
 _COUNTED = re.compile(r"\b(frame|sample|index|idx|row)s?\b")  # what is no time without a rate
-_LABELS = frozenset(
-    {
-        "label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture",
-        "activity", "category", "behavior", "event",
-    }
+#: Heads of labels; the first that a table has is taken, as others may be numbers of rows, or who wrote them.
+_LABELS = (
+    "label", "labels", "symbol", "annotation", "annotations", "gesture", "action", "activity", "behavior", "category",
+    "class", "event", "text", "value", "name",
 )  # fmt: skip
 _RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
 _CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
@@ -85,7 +84,7 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     if not starts or not ends:
         return None
     start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
-    labeled = [k for k, name in enumerate(names) if name in _LABELS]
+    labeled = [names.index(name) for name in _LABELS if name in names]
     others = [k for k, name in enumerate(names) if k not in {*starts, *ends} and not name.startswith("duration")]
     aside = _RECORDINGS | _PLACES
     labels = labeled or [k for k in others if names[k] and names[k] not in aside]
@@ -131,7 +130,7 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
         is_clock = time is None or ":" in cells[k]
         times.append(math.nan if time is None else time if is_clock else converted(time, UNITS[unit], UNITS["s"]))
     start, end = map(float, times)
-    if not end > start:
+    if not end >= start:  # one of no length, as a mark of Audacity, is outside of every recording
         raise DataError(
             f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
         )

@@ -33,7 +33,7 @@ MESSAGES = {
     LiveStatus.UNDECIDED: "no label has been sure enough for long enough",
     LiveStatus.DECIDED: "a label is decided",
     LiveStatus.TOO_SHORT: "fewer than four samples that can be used, or no motion yet",
-    LiveStatus.NOT_FINITE: "a sample with NaN or infinity was skipped",
+    LiveStatus.NOT_FINITE: "a sample with NaN, infinity or a number out of range was skipped",
     LiveStatus.TIME_NOT_INCREASING: "a sample that is not later than the one before was skipped",
     LiveStatus.WRONG_SHAPE: "expected a time and d positions or recorded columns, or k times and (k, d) of them, "
     "as many as the samples before; the call was skipped",

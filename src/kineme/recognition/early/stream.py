@@ -25,7 +25,7 @@ from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, References
 from kineme.similarity.describe import N_POINTS
-from kineme.validation import MIN_SAMPLES, Array, check_number
+from kineme.validation import LARGEST_POSITION, LARGEST_STAMP, MIN_SAMPLES, Array, check_number
 
 N_REMAINING = 20  # samples of the predicted path
 
@@ -336,6 +336,8 @@ class Samples:
         Of a call in a wrong shape one is counted.
         """
         try:
+            # What is masked is no number, and is skipped as others that are none.
+            t, x = (np.ma.filled(v.astype(float), np.nan) if np.ma.isMaskedArray(v) else v for v in (t, x))
             times, rows = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)
             rows = rows.reshape(len(times), -1) if np.ndim(t) == 0 else rows
         except (TypeError, ValueError, OverflowError):
@@ -354,9 +356,9 @@ class Samples:
         return times[usable], positions, status, int((~usable).sum())
 
     def _usable(self, times: Array, rows: Array, unit: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], LiveStatus]:
-        """Tell which samples are finite, later than those before, and have quaternions of norm 1 (`unit`)."""
+        """Tell which samples are in range, later than those before, and have quaternions of norm 1 (`unit`)."""
         status = LiveStatus(0)
-        finite = np.isfinite(times) & np.isfinite(rows).all(axis=1)
+        finite = (np.abs(times) <= LARGEST_STAMP) & (np.abs(rows) <= LARGEST_POSITION).all(axis=1)
         usable, last = np.zeros(len(times), dtype=bool), self._last
         for k, time in enumerate(times.tolist()):
             if not finite[k]:
@@ -400,7 +402,7 @@ class Decision:
 
     def update(self, elapsed: float, leader: int, share: float) -> int | None:
         """Return the decided label after the leader's share of the evidence at a time since the start."""
-        if share < self.confidence or leader == self.label:
+        if not share >= self.confidence or leader == self.label:  # of NaN, too
             self._candidate = None
             return self.label
         if leader != self._candidate:
