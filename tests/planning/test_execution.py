@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import deque
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -409,6 +410,13 @@ def plane(tmp_path):
     assert CliRunner().invoke(main, learn).exit_code == 0
     with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
         yield library
+
+
+@pytest.mark.parametrize("axes", [("z", "y", "x"), ("y", "x"), ("x",), ("across", "up")])
+def test_a_plan_in_other_coordinates_is_refused_with_what_to_do(axes):
+    domain = SimpleNamespace(vocabulary=SimpleNamespace(axes=axes))
+    with pytest.raises(SpecificationError, match=f"got {', '.join(axes)}; learn a new library .*--columns"):
+        frame_of(SimpleNamespace(problem=SimpleNamespace(domain=domain)))
 
 
 def test_a_plan_in_a_plane(plane):

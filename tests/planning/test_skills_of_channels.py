@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import ActionLibrary, Demonstrations
+from kineme import DMP, ActionLibrary, Demonstrations
+from kineme.dmp.generation.generate import learn_one
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.planning import SkillTools, outside, skill_of
 from kineme.planning.preview import nearest_inside, plan_symbol, preview_skill, standing_place
 from kineme.planning.skill import move_to, nearest_demonstration
-from kineme.robots import load
+from kineme.robots import load, move
 from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.planning.generate_at import generate_at
 
 U = np.linspace(0.0, 1.0, 100)
 EASED = U**3 * (10 - 15 * U + 6 * U**2)
@@ -146,3 +148,22 @@ def test_a_tip_goes_to_its_axes_in_whichever_order_a_file_has_them(tmp_path):
             tip = kinematics(robot, robot.rest[None])[0][0]
             np.testing.assert_allclose(standing_place(library, skill, robot, robot.rest), tip[order])
     np.testing.assert_allclose(ends, [path[[0, -1]]] * 2, atol=1e-6)
+
+
+def test_a_tip_goes_up_where_columns_x_and_z_do(tmp_path):
+    robot = load("panda")
+    tip = kinematics(robot, robot.rest[None])[0][0]
+    path = tip[[0, 2]] + EASED[:, None] * [0.0, -0.1]
+    plain = Demonstrations.from_arrays([path], ["down"], [3.0 * U])
+    channels = tuple(Channel(axis, "position", (axis,), "m") for axis in "xz")
+    shown = Demonstrations.of_movements(of_channels(plain.movements, channels))
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(shown)
+        skill = skill_of(library, "down")
+        np.testing.assert_allclose(standing_place(library, skill, robot, robot.rest), tip[[0, 2]])
+        planned = plan_symbol(library, robot, "down", robot.rest)
+    learned = learn_one(shown, DMP())
+    generated = generate_at(learned, goal=[tip[0], 0.3, tip[2] - 0.1])
+    assert generated.plane == "xz"
+    for moved in (planned, move(shown, robot), move(generated.movement, robot)):
+        np.testing.assert_allclose(moved.path.positions[-1, [0, 2]], path[-1], atol=1e-6)

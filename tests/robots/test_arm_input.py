@@ -11,8 +11,11 @@ from click.testing import CliRunner
 
 import kineme
 from arm_samples import stroke
+from kineme import Demonstrations
 from kineme.cli import main
 from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channel
+from kineme.movements.trajectories.movements import of_channels
 from kineme.robots import ArmController, InfeasibleError, InverseKinematics, load, move
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -81,8 +84,14 @@ def test_a_start_outside_the_limits_is_named(panda):
 def test_another_number_of_joints_or_dimensions_is_said(panda):
     with pytest.raises(TrajectoryError, match=r"of the 7 joints of panda, got 6 columns; choose .*=discrete"):
         move(np.zeros((40, 6)) + np.linspace(0, 1, 40)[:, None], panda, space="joints")
+    rows = np.zeros((40, 6)) + np.linspace(0, 1, 40)[:, None]
     with pytest.raises(TrajectoryError, match="of 2 or 3 dimensions, got 5"):
-        move(np.zeros((40, 5)) + np.linspace(0, 1, 40)[:, None], panda)
+        move(rows[:, :5], panda)
+    channels = tuple(Channel(name, "position", (name,), None) for name in ("x", "y", "z", "rx", "ry", "rz"))
+    plain = Demonstrations.from_arrays([rows], times=[np.linspace(0, 3, 40)])
+    one = Demonstrations.of_movements(of_channels(plain.movements, channels))
+    with pytest.raises(TrajectoryError, match=r"got 6; .* quaternion .* are the joints \(space='joints', --joints\)"):
+        move(one, load("ur5e"))
 
 
 @pytest.mark.parametrize(

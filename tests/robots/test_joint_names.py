@@ -14,7 +14,7 @@ from kineme.io.writing.write_movement import write_movement
 from kineme.movements.channels.channel import Channel
 from kineme.robots import load, move
 from kineme.robots.planning.move import request_of
-from kineme.robots.planning.roles import axis_order, check_order, joints_among, roles_of, space_of
+from kineme.robots.planning.roles import axis_order, check_order, joints_among, plane_of, roles_of, space_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -171,3 +171,18 @@ def test_a_tip_of_other_names_keeps_their_order_unless_an_axis_is_out_of_place()
         channels = tuple(Channel(name, "position", (name,)) for name in names)
         with pytest.raises(TrajectoryError, match=r"expected the positions of the tip as x, y, z.*rename them"):
             roles_of(channels, len(names), "tip")
+
+
+def test_two_columns_lie_in_the_plane_that_their_names_say():
+    def plane(names, given=None):
+        return plane_of([Channel(name, "position", (name,)) for name in names.split()], given)
+
+    assert [plane("x z"), plane("tip_y tip_z"), plane("x y"), plane("across up"), plane("x y z")] == [
+        "xz", "yz", "xy", "xy", "xy",
+    ]  # fmt: skip
+    assert [plane("x y", "xz"), plane("across up", "yz"), plane("across z", "yz")] == ["xz", "yz", "yz"]  # drawings
+    for names, given in (("x z", "xy"), ("y z", "xz"), ("across z", None)):
+        with pytest.raises(
+            TrajectoryError, match=r"expected a plane with the axes that .* say, got 'x[yz]'; .*--plane"
+        ):
+            plane(names, given)

@@ -89,8 +89,8 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
 @click.option("--at", type=opts.NUMBERS, help="Start in the frame of the robot.  [default: where the arm does it best]")
 @click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
 @click.option("--scale", type=opts.Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
-@click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True,
-              help="Where the axes of a movement in the plane lie.")  # fmt: skip
+@click.option("--plane", type=click.Choice(["xy", "xz", "yz"]),
+              help="Where the axes of a movement in the plane lie.  [default: as columns say, else xy]")  # fmt: skip
 @click.option(
     "--orientation", type=opts.NUMBERS, help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]"
 )
@@ -202,5 +202,6 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         timing="fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated",
         steps=generated.steps,
         continuous=generated.continuous,
-        **{name: options[name] for name in ("orientation", "follow", "plane", "rate", "start", "force")},
+        plane=generated.plane,
+        **{name: options[name] for name in ("orientation", "follow", "rate", "start", "force")},
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
+from hashlib import sha256
 from string import Template
 from typing import Any
 
@@ -345,10 +346,12 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
     }
     largest = max(np.abs(values).max() for values, _ in tables.values())
     used = {key: table for key, table in tables.items() if re.search(rf"\{{p\}}_{key}\b", text)}
+    written = "".join(_c_table(p, key, *table) for key, table in used.items())
     return Template(text).substitute(
         p=p,
         single='#error "numbers of this movement need double precision"\n' if largest > _LARGEST_SINGLE else "",
-        guard=p.upper(),
+        # Of two movements with one prefix, a compiler refuses the second, and does not skip it.
+        guard=f"{p.upper()}_{sha256((text + written).encode()).hexdigest()[:8].upper()}",
         d=primitive.n_dims,
         n=dmp.n_basis,
         formulation=dmp.formulation,
@@ -358,7 +361,7 @@ def c_header(primitive: Primitives, name: str = "movement") -> str:
         columns=", ".join(
             re.sub(r"[^\w .()\[\]-]", "_", column, flags=re.ASCII) for column in exported_columns(primitive)
         ),
-        tables="".join(_c_table(p, key, *table) for key, table in used.items()),
+        tables=written,
     )
 
 

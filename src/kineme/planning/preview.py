@@ -24,7 +24,7 @@ from kineme.robots.kinematics.descent import PLANES, kinematics
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
-from kineme.robots.planning.roles import roles_of, scales_of, space_of
+from kineme.robots.planning.roles import plane_of, roles_of, scales_of, space_of
 from kineme.units import split_head
 from kineme.validation import Array
 
@@ -161,11 +161,12 @@ def standing_place(library: ActionLibrary, skill: Skill, robot: Robot, joints: A
     try:
         roles = roles_of(channels, n, space, robot)
         scales = scales_of(roles, robot if space == "joints" else None)
+        plane = plane_of(roles.columns) if space == "tip" else ""
     except TrajectoryError:
         return None
     values = joints if space == "joints" else kinematics(robot, joints[None])[0][0]
     if space == "tip" and len(roles.positions) == 2:
-        values = values[list(PLANES["xy"])]
+        values = values[list(PLANES[plane])]
     names = [channel.name for channel in roles.columns] or list(skill.axes)
     if len(roles.positions) != len(values) or len(names) != len(values) or not set(skill.axes) <= set(names):
         return None

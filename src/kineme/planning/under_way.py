@@ -56,7 +56,10 @@ def frame_of(plan: Plan, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
     """Return the frame of a plan whose axes are x, y, z, or two of them: then `origin` says where their plane lies."""
     axes = plan.problem.domain.vocabulary.axes
     if [*axes] != [axis for axis in _AXES if axis in axes] or len(axes) < 2:
-        raise SpecificationError(f"expected a plan in coordinates x, y, z or two of them, got {', '.join(axes)}")
+        raise SpecificationError(
+            f"expected a plan in coordinates x, y, z or two of them, got {', '.join(axes)}; learn a new library from "
+            "these columns in this order (columns=, --columns), then its operators and the plan"
+        )
     return Frame([_AXES.index(axis) for axis in axes], as_point("origin", origin, _AXES))
 
 

@@ -201,6 +201,17 @@ def test_hostile_names_compile(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@needs_gcc
+def test_two_movements_of_one_prefix_do_not_compile_and_one_that_is_included_twice_does(tmp_path):
+    for i, (name, seed) in enumerate((("wave 1", 0), ("Wave-1", 1), ("wave_1", 0))):
+        (tmp_path / f"{i}.h").write_text(c_header(learned(n_dims=1, seed=seed), name))
+    for others, fits in (("02", True), ("01", False)):
+        code = "".join(f'#include "{i}.h"\n' for i in others) + "wave_1_state state;\n"
+        options = [*WARNINGS, "-std=c99", "-fsyntax-only", "-xc", "-"]
+        done = subprocess.run(["gcc", *options], input=code, cwd=tmp_path, text=True, capture_output=True, check=False)
+        assert (done.returncode == 0, "redefinition of" in done.stderr) == (fits, not fits)
+
+
 def test_what_has_no_header_is_refused():
     primitive = learned()
     rhythm = RhythmicDMP().learn([np.sin(np.linspace(0, 30, 400))[:, None]])

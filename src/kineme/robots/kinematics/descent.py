@@ -185,8 +185,8 @@ def task_path(
     d = positions.shape[1]
     if d not in (2, 3):
         raise TrajectoryError(
-            f"expected a movement of the tip, of 2 or 3 dimensions, got {d}; a movement of the joints has as many as "
-            "the robot"
+            f"expected a movement of the tip, of 2 or 3 dimensions, got {d}; give its orientation as a quaternion in "
+            "columns qw, qx, qy, qz, or say that the columns are the joints (space='joints', --joints)"
         )
     if plane not in PLANES:
         raise SpecificationError(f"expected plane as one of {', '.join(PLANES)}, got {plane!r}")

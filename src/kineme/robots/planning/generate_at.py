@@ -14,7 +14,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import Scales, roles_of, scales_of
+from kineme.robots.planning.roles import Scales, plane_of, roles_of, scales_of
 from kineme.validation import Array, as_point
 
 
@@ -24,6 +24,7 @@ class GeneratedMovement(NamedTuple):
     movement: Trajectory  # [m] or [rad]; of the tip alone or, (T, 7), with its orientations w, x, y, z
     steps: dict[str, Array]  # name -> (T,)
     continuous: dict[str, Array]  # the same of what moves beside joints, as a gripper
+    plane: str  # of two positions
 
 
 def generate_at(  # noqa: PLR0913 - one parameter per option
@@ -37,7 +38,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     rate: float = 100.0,
     joints: Robot | None = None,
     joint_units: str | None = None,
-    plane: str = "xy",
+    plane: str | None = None,
 ) -> GeneratedMovement:
     """Generate a movement of the tip, or of the `joints` of an arm, with start and goal in the frame of the robot.
 
@@ -54,6 +55,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         )
     frame = joints.joints if joints else "xyz"
     begin, end = (None if p is None else as_point(name, p, frame) for name, p in (("at", at), ("goal", goal)))
+    plane = plane_of(() if joints else roles.columns, plane)
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     if begin is not None and end is not None and len(axes) < len(end):
         across = ({0, 1, 2} - {*axes}).pop()
@@ -90,4 +92,4 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         {name: recorded[:, column] for name, column in columns.items()}
         for columns in (roles.discrete, roles.continuous)
     )
-    return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous)
+    return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous, plane)

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.pose.pose_dmp import PosePrimitives
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.rotations import quaternion_of
 from kineme.movements.segmentation.segment import as_recording
@@ -20,7 +21,7 @@ from kineme.robots.kinematics import descent
 from kineme.robots.kinematics.pursuit import choose_place, choose_posture, pursue
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.planning import robot_movement
-from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, roles_of, scales_of, space_of
+from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, plane_of, roles_of, scales_of, space_of
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 PLACES = ("as given", "free")
@@ -40,7 +41,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     space: str = "auto",
     orientation: ArrayLike | None = None,
     follow: str = "full",
-    plane: str = "xy",
+    plane: str | None = None,
     place: str = "as given",
     timing: str = "generated",
     rate: float = 100.0,
@@ -68,8 +69,9 @@ def move(  # noqa: PLR0913 - one parameter per option
         the rest posture.
     follow : {"full", "axis", "free"}, default "full"
         How much of the orientation is followed; see `InverseKinematics`.
-    plane : {"xy", "xz", "yz"}, default "xy"
-        Where the axes of a two-dimensional movement lie; the third coordinate is that of the tip at rest.
+    plane : {"xy", "xz", "yz"}, optional
+        Where the axes of a two-dimensional movement lie; the third coordinate is that of the tip at rest. By default
+        the axes that names of columns say, as x and z, else "xy".
     place : {"as given", "free"}, default "as given"
         "free" shifts the movement to where the arm executes it best.
     timing : {"generated", "slowed", "fastest"}, default "generated"
@@ -104,7 +106,8 @@ def move(  # noqa: PLR0913 - one parameter per option
     """
     check_robot(robot)
     check_choice("space", space, SPACES)
-    check_choice("plane", plane, list(descent.PLANES))
+    if plane is not None:
+        check_choice("plane", plane, list(descent.PLANES))
     check_choice("timing", timing, robot_movement.TIMINGS)
     check_choice("place", place, PLACES)
     if joint_units is not None:
@@ -142,6 +145,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     # A missing orientation or third coordinate is that of the tip at rest.
     turned = request.orientations if orientation is None else orientation
     turned = quaternion_of(ik.tip_rotation) if turned is None else turned
+    plane = plane_of(request.columns, plane)
     path = descent.task_path(request.times, request.positions, turned, plane, ik.tip_position)
     return _along(ik, path, place, planned, timing, force)
 
@@ -232,6 +236,7 @@ class Request(NamedTuple):
     times: Array  # (T,) [s], from 0
     space: str  # "tip" or "joints"
     positions: Array  # (T, d) [m] or [rad]
+    columns: tuple[Channel, ...]  # of the positions; empty if nothing is known of them
     orientations: Array | None  # (T, 4), w, x, y, z
     steps: dict[str, Array]  # discrete channels, (T,)
     continuous: dict[str, Array]  # channels that move and are no joints, (T,)
@@ -268,4 +273,4 @@ def request_of(
             raise TrajectoryError(f"expected other channels of other names than the joints have, got {name!r}")
         if values.shape != times.shape:
             raise TrajectoryError(f"expected {len(times)} values of {name}, one for each sample, got {values.shape}")
-    return Request(times - times[0], space, positions, turned, *beside)
+    return Request(times - times[0], space, positions, roles.columns, turned, *beside)

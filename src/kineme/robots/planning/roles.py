@@ -222,8 +222,7 @@ def axis_order(names: Sequence[str]) -> list[int]:
 
     Raises `TrajectoryError` where names of axes are in another order among others, of which the axis is not known.
     """
-    said = [[word for word in words_of(name_of(name)) if word in {*_AXES}] for name in names]
-    axes = ["".join(words) if len(words) == 1 else "" for words in said]
+    axes = _axes_said(names)
     if all(axes) and len({*axes}) == len(axes):
         return sorted(range(len(axes)), key=axes.__getitem__)
     if any(axis and _AXES.index(axis) < k for k, axis in enumerate(axes)):
@@ -232,6 +231,28 @@ def axis_order(names: Sequence[str]) -> list[int]:
             "columns=, in the shell --columns, or rename them"
         )
     return list(range(len(axes)))
+
+
+def plane_of(columns: Sequence[Channel], plane: str | None = None) -> str:
+    """Return the plane of two positions of the tip, in their order: as given, else as their names say, else "xy".
+
+    Columns x and y may be given any plane, as those of a drawing; beside a z, names of axes mean those of the robot.
+    """
+    names = [channel.name for channel in columns]
+    axes = _axes_said(names)
+    taken = plane or ("".join(axes) if len(axes) == 2 and all(axes) else "xy")
+    if len(axes) == 2 and "z" in axes and any(said not in ("", axis) for said, axis in zip(axes, taken, strict=True)):
+        remedy = "leave plane= away, in the shell --plane," if all(axes) else "say plane=, in the shell --plane,"
+        raise TrajectoryError(
+            f"expected a plane with the axes that {', '.join(names)} say, got {taken!r}; {remedy} or rename the columns"
+        )
+    return taken
+
+
+def _axes_said(names: Sequence[str]) -> list[str]:
+    """The axis that each name says, as ``tip_z``, else ""."""
+    said = [[word for word in words_of(name_of(name)) if word in {*_AXES}] for name in names]
+    return ["".join(words) if len(words) == 1 else "" for words in said]
 
 
 def check_order(names: Sequence[str], robot: Robot) -> None:

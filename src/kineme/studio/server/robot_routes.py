@@ -59,7 +59,7 @@ class MoveRequest(PrimitiveRequest):
     displacement: Point | None = None
     duration: Number | None = Field(None, gt=0)
     size: Number | None = Field(None, gt=0)
-    plane: Literal["xy", "xz", "yz"] = "xy"
+    plane: Literal["xy", "xz", "yz"] | None = Field(None, description="By default as the columns say, else xy.")
     slow_down: bool = False
     shapes: bool = Field(True, description="Whether the scene has the shapes of the arm, with meshes many megabytes.")
 
@@ -220,7 +220,7 @@ def _planned(studio: Studio, body: MoveRequest, robot: Robot) -> RobotMovement:
         generated.movement,
         robot,
         space=space,
-        plane=body.plane,
+        plane=generated.plane,
         place="as given" if body.at is not None or space == "joints" else "free",
         timing="slowed" if body.slow_down else "generated",
         steps=generated.steps,
