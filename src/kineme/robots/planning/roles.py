@@ -70,7 +70,7 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         raise TrajectoryError(
             f"expected the tip by its position, and turned by a quaternion, got the angles {', '.join(angles)}; "
             "convert them to columns qw, qx, qy, qz or leave them out (columns=, in the shell --columns, --exclude); "
-            "of a gripper say --kind gripper=discrete, of joints --joints"
+            "of a gripper say --kind gripper=discrete, of joints use robots.move(space='joints'), in the shell --joints"
         )
     orientations = [pair for pair in at if pair[0].kind == "orientation" and space == "tip"]
     if len(orientations) > 1:
