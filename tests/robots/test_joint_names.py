@@ -102,6 +102,41 @@ def test_names_of_other_joints_are_refused_and_no_names_are_said(tmp_path):
         assert _moved(tmp_path, [f"q{k}" for k in range(6)], joints) == pytest.approx(joints[-1], abs=1e-6)
 
 
+def test_the_joints_of_the_other_arm_are_refused(tmp_path):
+    """Without a word the right arm executed what the left one was shown."""
+    limit = '<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="50"/><origin xyz="0 0 0.2"/>'
+    parts = ["<link name='base'/>"]
+    for side in ("left", "right"):
+        for k, parent in enumerate(("base", f"{side}_l0", f"{side}_l1", f"{side}_l2")):
+            ends = f'<parent link="{parent}"/><child link="{side}_l{k}"/>'
+            parts += f'<link name="{side}_l{k}"/>', f'<joint name="{side}_j{k}" type="revolute">{ends}{limit}</joint>'
+    (tmp_path / "two.urdf").write_text(f"<robot name='two'>{''.join(parts)}</robot>")
+    robot = load(tmp_path / "two.urdf", tip="right_l3")
+    names = {side: [f"{side}_j{k}" for k in range(4)] for side in ("left", "right")}
+    for head in ("{}", "{} [rad]", "state.{}.pos"):
+        columns = [head.format(name) for name in names["left"]]
+        with pytest.raises(TrajectoryError, match=r"expected the joints right_j0, .* got left_j0, .*choose the tip"):
+            joints_among(columns, robot)
+        with pytest.raises(TrajectoryError, match=r"got left_j0, .* which two has besides"):
+            check_order(columns[::-1], robot)
+        assert joints_among(columns + [head.format(name) for name in names["right"]], robot) == [4, 5, 6, 7]
+    assert joints_among([f"j{k}" for k in range(4)], robot) == [0, 1, 2, 3]
+
+
+def test_numbered_joints_of_another_arm_are_said():
+    robot = load("panda")
+
+    def found(head):
+        names = [head.format(k) for k in range(1, 8)]
+        return roles_of(tuple(Channel(name, "angle", (name,)) for name in names), 7, "joints", robot).positions
+
+    for head in ("iiwa_joint_{}", "left_arm_joint{} [deg]"):
+        with pytest.warns(UserWarning, match=r"joint_?1.* are taken as panda_joint1, .* one after the other"):
+            assert found(head) == [*range(7)]
+    for head in ("q{}", "joint{} [deg]", "panda_joint{}", "state.panda_joint{}_position"):  # and without a warning
+        assert found(head) == [*range(7)]
+
+
 def _written(folder, kind, times, columns):
     path, table = folder / f"{kind}.{kind if kind in {'npz', 'json'} else 'csv'}", np.column_stack((times, columns))
     match kind:

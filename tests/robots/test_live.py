@@ -115,6 +115,41 @@ def test_a_start_out_of_reach_and_other_columns_are_refused():
         ArmController(robot, moving.controller(DT)).step(dt=0.1)
 
 
+@pytest.mark.parametrize(
+    ("heads", "refused"),
+    [
+        ([f"panda_joint{k}" for k in range(1, 8)], "got the angles panda_joint1, .*space='joints'"),
+        (["x", "y", "yaw"], "got the angles yaw"),
+        (["z", "y", "x"], "x, y, z .* in this order, .* got z, y, x"),
+        (["x [ft]", "y [ft]", "z [ft]"], r"x, y, z \[m\] .* got x \[ft\], y \[ft\], z \[ft\]; learn .* in meters"),
+        (["qx", "qy", "qz", "qw", "z", "y", "x"], "in this order, .* got z, y, x, qx"),
+        (None, "a position and a unit quaternion, got a norm of 2"),
+        (["x", "y", "z"], None),
+        (["tip_x [m]", "tip_y [m]", "tip_z [m]"], None),
+        (["qx", "qy", "qz", "qw", "x", "y", "z"], None),
+    ],
+)
+def test_what_is_no_tip_in_meters_in_order_is_refused(heads, refused, tmp_path):
+    """Columns were read as x, y, z and w, x, y, z whatever they are: joints went to their stops."""
+    robot = load("panda")
+    place = np.linspace([0.4, -0.1, 0.4], [0.4, 0.1, 0.45], 30)
+    turned = np.tile([1.0, 0.0, 0.0, 0.0], (30, 1))  # x, y, z, w: points down
+    posed = heads is not None and "qx" in heads
+    columns = np.hstack((turned, place) if posed else (place, turned))[:, : len(heads or range(7))]
+    learned = [kineme.Trajectory(np.linspace(0, 3, 30), columns * ([1.0] * 3 + [2.0] * 4))] if heads is None else None
+    if heads is not None:
+        rows = np.column_stack((np.linspace(0, 3, 30), columns))
+        np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(("time", *heads)), comments="")
+        learned = kineme.read_recordings(tmp_path / "a.csv").demonstrations
+    controller = (PoseDMP() if posed else kineme.DMP()).learn(learned).controller(DT)
+    if refused is None:
+        _, joints, _ = run(ArmController(robot, controller), 300)
+        np.testing.assert_allclose(standing(robot, joints[-1]).tip_positions[0], place[-1], atol=2e-3)
+    else:
+        with pytest.raises(TrajectoryError, match=refused):
+            ArmController(robot, controller)
+
+
 def test_a_simulated_panda_follows_the_slowed_trajectory():
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     robot = load("panda")

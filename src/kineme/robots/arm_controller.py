@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 from kineme.dmp.control.controller import Controller
 from kineme.dmp.control.plan import State
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations import matrices_of, matrix_one
+from kineme.movements.channels.channel import recorded_names
+from kineme.movements.rotations import NORM_TOLERANCE, matrices_of, matrix_one
+from kineme.movements.trajectories.presented import with_units
 from kineme.robots.execution.joint_trajectory import Torques
 from kineme.robots.execution.preflight import TRACKED, TURNED
 from kineme.robots.kinematics import descent
 from kineme.robots.models.robot import Robot, check_robot
+from kineme.robots.planning.roles import roles_of, scales_of
 from kineme.validation import Array, as_numbers, as_point
 
 _AT = 1 - 1e-9  # share of a limit from which it counts as met
@@ -95,7 +98,7 @@ class ArmController:
     ----------
     robot : Robot
     controller : Controller
-        Of a primitive of the tip: three positions in the frame of the robot [m], or poses (7 columns).
+        Of a primitive of the tip: x, y, z in the frame of the robot [m], or poses (7 columns), learned in this order.
     start : array_like of shape (n,), optional
         Where the joints stand; by default in the posture, of those that reach the start of the movement, that is
         nearest to the rest posture.
@@ -131,11 +134,7 @@ class ArmController:
         follow: str = "full",
     ) -> None:
         check_robot(robot)
-        d = len(controller.state.position)
-        if d not in (3, 7):
-            raise TrajectoryError(
-                f"expected a controller of three positions, or of poses of seven columns, got {d} columns"
-            )
+        check_tip(controller)
         self.robot, self.controller = robot, controller
         self._ik, self._torques = LiveKinematics(robot, follow, controller.dt), Torques(robot)
         self._rotation = self._ik.tip_rotation
@@ -200,6 +199,29 @@ class ArmController:
         postures = descent.reaching_postures(self.robot, position, rotation, self._ik.costs, what)
         away = np.abs(postures - self.robot.rest).max(axis=1)
         return np.asarray(postures[int(np.argmin(away))])
+
+
+def check_tip(controller: Controller[Any]) -> None:
+    """Refuse a movement whose columns are not x, y, z [m] in this order, alone or before a unit quaternion."""
+    place, channels = controller.state.position, controller.channels
+    d = len(place)
+    if d not in (3, 7):
+        raise TrajectoryError(
+            f"expected a controller of three positions, or of poses of seven columns, got {d} columns"
+        )
+    roles = roles_of(channels, d, "tip")
+    in_order = roles.positions == [0, 1, 2] and (d == 3) == (roles.orientation is None)
+    if not in_order or np.any(scales_of(roles, None).size != 1.0):
+        named = "" if channels is None else ", ".join(with_units(recorded_names(channels), channels))
+        raise TrajectoryError(
+            f"expected x, y, z [m] in this order, alone or with one quaternion, got {named}; learn columns in "
+            "this order (columns=) and in meters, or let robots.move put them so"
+        )
+    if d == 7 and not abs(np.linalg.norm(place[3:]) - 1.0) <= NORM_TOLERANCE:
+        raise TrajectoryError(
+            "expected seven columns as a position and a unit quaternion, got a norm of "
+            f"{np.linalg.norm(place[3:]):.4g}; of joints use robots.move(..., space='joints')"
+        )
 
 
 class LiveKinematics(descent.InverseKinematics):

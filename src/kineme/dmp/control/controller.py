@@ -22,6 +22,7 @@ from kineme.dmp.control.plan import (
 )
 from kineme.dmp.control.stepping import stepper
 from kineme.errors import SpecificationError
+from kineme.movements.channels.channel import Channels
 from kineme.validation import Array, check_number
 
 S = TypeVar("S", bound=State)
@@ -44,6 +45,8 @@ class Controller(Generic[S]):
     ----------
     state : State
         After the last step; at first the start.
+    channels : tuple of Channel or None
+        Of the columns of `state`, where they are known.
 
     Notes
     -----
@@ -52,7 +55,7 @@ class Controller(Generic[S]):
 
     state: S
 
-    def __init__(self, plan: Plan, dt: float, options: Options) -> None:
+    def __init__(self, plan: Plan, dt: float, options: Options, channels: Channels | None = None) -> None:
         if not isinstance(plan, Plan):
             raise SpecificationError(
                 f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
@@ -61,7 +64,7 @@ class Controller(Generic[S]):
         if not SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
             most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
             raise SpecificationError(f"expected dt of at most {most} {plan.duration:g} s, got {dt!r} s")
-        self.dt, self.options = float(dt), options
+        self.dt, self.options, self.channels = float(dt), options, channels
         self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
         self._set_tau(plan.duration)
         self._limits = Limits(

@@ -380,7 +380,7 @@ class Primitives(Batch):
         x0, g, v0, end = (one_vector(name, vector, self.n_dims) for name, vector in vectors.items())
         targets = None if via is None else via_points(via, self.n_dims)
         movement = modulated(rollout(self, x0, g, duration, v0), targets, end, position_limits)
-        return Controller(plan_along(movement, self.n_dims, targets), dt, options)
+        return Controller(plan_along(movement, self.n_dims, targets), dt, options, self.moving_channels)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

@@ -10,6 +10,7 @@ import numpy as np
 from kineme.dmp.control.controller import Controller, is_usable, read_vector
 from kineme.dmp.control.plan import Options, Plan, State, Status
 from kineme.dmp.pose.tangent import Components, acceleration_components, rate_components, velocity_components
+from kineme.movements.channels.channel import Channels
 from kineme.movements.rotations import conjugate, exp_one, log_one, product_components
 from kineme.validation import Array
 
@@ -52,12 +53,19 @@ class PoseController(Controller[PoseState]):
     without a position have none.
     """
 
-    def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        dt: float,
+        options: Options,
+        reference: Array,
+        channels: Channels | None = None,
+    ) -> None:
         references = reference.reshape(-1, 4)
         self._references = references.tolist()
         self._backwards = conjugate(references).tolist()
         self._linear = plan.n_positions  # columns before the orientations
-        super().__init__(plan, dt, options)
+        super().__init__(plan, dt, options, channels)
 
     def _read_place(self, value: Any, near: Array) -> Array | None:
         """Return position and the rotation vector closest to that of `near`; None for what is no pose."""

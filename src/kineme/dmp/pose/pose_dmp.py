@@ -322,7 +322,7 @@ class PosePrimitives(Batch):
         changes = changes_in_tangent(movement, references, via, end_velocity, position_limits)
         plan = plan_along(modulated(movement, *changes), self.n_positions, changes[0])
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
-        return PoseController(plan, dt, options, references[0])
+        return PoseController(plan, dt, options, references[0], self.moving_channels)
 
     def _asked_for(
         self,

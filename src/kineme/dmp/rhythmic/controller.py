@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from kineme.dmp.control.controller import Controller, is_usable, read_number
 from kineme.dmp.control.plan import FilteredValue, Options, Plan, State, Status
+from kineme.movements.channels.channel import Channels
 from kineme.validation import LARGEST_STAMP, SHORTEST_STEP, Array
 
 
@@ -35,9 +36,17 @@ class RhythmicController(Controller[RhythmicState]):
     go on from where they are, and the movement approaches the new cycle as ``exp(-sqrt(K) t / period)``.
     """
 
-    def __init__(self, plan: Plan, dt: float, options: Options, learned_amplitude: float, gain: float) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        dt: float,
+        options: Options,
+        learned_amplitude: float,
+        gain: float,
+        channels: Channels | None = None,
+    ) -> None:
         self._learned_amplitude, self._first_gain = learned_amplitude, np.array([gain])
-        super().__init__(plan, dt, options)
+        super().__init__(plan, dt, options, channels)
 
     def reset(self) -> RhythmicState:
         """Back to the start, with the first baseline, amplitude and period; returns the state there."""

@@ -298,7 +298,7 @@ class RhythmicPrimitives(Batch):
             longest_step=_LONGEST_STEP,
             via=None if targets is None else ViaPlaces(targets.times, targets.points[0] - origin, MISSED * size),
         )
-        return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)
+        return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain, self.moving_channels)
 
 
 def refuse_others(what: str, options: Mapping[str, object]) -> None:

@@ -102,7 +102,7 @@ def load(
         raise DataError("expected the package pin for arms; pip install 'kineme[robot]'") from error
     path, default_tip, default_rest, name = _find(robot, tip)
     chain = read_chain(path, tip or default_tip)
-    model, geometry = _build(pinocchio, path, chain)
+    model, geometry, locked = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
     assumed = [MODELS[name].assumed] if name in MODELS and path.parent == FOLDER and MODELS[name].assumed else []
     assumed += _assumptions(chain)
@@ -133,6 +133,7 @@ def load(
         path,
         model,
         geometry,
+        locked,
     )
 
 
@@ -150,21 +151,21 @@ def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLi
     return path, None, None, path.stem
 
 
-def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
-    """Build the reduced model of the chain's joints, and the geometry of those links whose shapes can be had."""
+def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any, tuple[str, ...]]:
+    """Build the reduced model of the chain's joints and the geometry of links whose shapes can be had; name others."""
     try:
         full = pinocchio.buildModelFromXML(chain.text)
         shapes = pinocchio.buildGeomFromUrdfString(full, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
-        locked = [full.getJointId(name) for name in list(full.names)[1:] if name not in chain.joints]
+        locked = tuple(str(name) for name in list(full.names)[1:] if name not in chain.joints)
         _check_read(chain.text, full, shapes, path)
         still = np.clip(pinocchio.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
-        model, geometry = pinocchio.buildReducedModel(full, shapes, locked, still)
+        model, geometry = pinocchio.buildReducedModel(full, shapes, list(map(full.getJointId, locked)), still)
     except (ValueError, RuntimeError) as error:
         raise DataError(f"{path}: pinocchio cannot read this URDF: {error}") from error
     order = [str(name) for name in list(model.names)[1:]]
     if order != list(chain.joints):
         raise DataError(f"{path}: expected the joints in the order {list(chain.joints)}, got {order}")
-    return model, geometry
+    return model, geometry, locked
 
 
 def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
@@ -299,6 +300,7 @@ class Robot:
     - `assumed`: what the file does not say and what is taken instead, one sentence each.
     - `source`: the URDF file.
     - `model`, `geometry`: of these joints alone; all others are locked.
+    - `locked`: names of the other joints that the file says to move.
     """
 
     name: str
@@ -315,6 +317,7 @@ class Robot:
     source: Path
     model: Any
     geometry: Any
+    locked: tuple[str, ...] = ()
 
     @property
     def n_joints(self) -> int:

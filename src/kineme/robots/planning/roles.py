@@ -70,7 +70,7 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
         raise TrajectoryError(
             f"expected the tip by its position, and turned by a quaternion, got the angles {', '.join(angles)}; "
             "convert them to columns qw, qx, qy, qz or leave them out (columns=, in the shell --columns, --exclude); "
-            "of a gripper say --kind gripper=discrete, of joints --joints"
+            "of a gripper say --kind gripper=discrete, of joints use robots.move(space='joints'), in the shell --joints"
         )
     orientations = [pair for pair in at if pair[0].kind == "orientation" and space == "tip"]
     if len(orientations) > 1:
@@ -82,6 +82,8 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     joints = None if robot is None or space != "joints" else joints_among(names, robot)
     continuous = {}
     if joints is not None:
+        if robot is not None and not are_unknown(channels):
+            _warn_of_other_names([names[k] for k in joints], robot)
         continuous = {channel.name: column for k, (channel, column) in enumerate(along) if k not in joints}
         along = [along[k] for k in joints]
     elif robot is not None and space == "joints" and len(along) == robot.n_joints:
@@ -191,7 +193,8 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 
     Units, features and topics, the ``.pos`` of LeRobot's drivers, and the side of one arm of two are no part of it.
     Without such names, columns with all words of a joint are it, as ``ur5_elbow_joint_position``; or those that differ
-    from one another by the same words as the joints, as ``q1``. Columns of velocities and efforts are none.
+    from one another by the same words as the joints, as ``q1``. Names of other
+    joints of the same robot are refused then. Columns of velocities and efforts are none.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
@@ -214,7 +217,9 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     for columns in sides.values():
         return columns
     words, joints = [words_of(name_of(name)) for name in names], list(map(words_of, robot.joints))
-    return _single(_holding(words, joints)) or _differing(words, joints)
+    found = _single(_holding(words, joints)) or _differing(words, joints)
+    _check_no_others([plain[k] for k in found or ()], robot)
+    return found
 
 
 def axis_order(names: Sequence[str]) -> list[int]:
@@ -260,6 +265,7 @@ def check_order(names: Sequence[str], robot: Robot) -> None:
     rates = list(filter(_is_rate, names))
     if rates:
         raise TrajectoryError(f"expected positions of the joints, got {', '.join(rates)}; choose other columns")
+    _check_no_others([split_head(name)[0].removesuffix(DRIVERS) for name in names], robot)
     words, joints = [words_of(name_of(name)) for name in names], _different(list(map(words_of, robot.joints)))
     listed = ", ".join(names)
     for k, holding in enumerate(_holding(words, joints)):
@@ -272,6 +278,23 @@ def check_order(names: Sequence[str], robot: Robot) -> None:
     if len(numbers) == len(words) and numbers != sorted(numbers):
         raise TrajectoryError(f"expected the joints in the order of their numbers, got {listed}; order the columns")
     warn(f"{listed} are taken as {', '.join(robot.joints)}, one after the other", UserWarning, 4)
+
+
+def _check_no_others(names: Sequence[str], robot: Robot) -> None:
+    """Refuse names of joints of the same robot that are no part of this arm, as those of its other arm."""
+    others = [joint for joint in robot.locked if _places(names, joint)]
+    if others:
+        raise TrajectoryError(
+            f"expected the joints {', '.join(robot.joints)}, got {', '.join(others)}, which {robot.name} has besides; "
+            "choose the tip that they move (tip=, in the shell --tip), or rename the columns"
+        )
+
+
+def _warn_of_other_names(names: Sequence[str], robot: Robot) -> None:
+    """Warn that columns, in the order of the joints, have words of another arm in place of those of this one."""
+    pairs = [({*words_of(name_of(name))}, {*words_of(joint)}) for name, joint in zip(names, robot.joints, strict=True)]
+    if any(max(map(len, words - joint), default=0) > 1 and joint - words - {"joint"} for words, joint in pairs):
+        warn(f"{', '.join(names)} are taken as {', '.join(robot.joints)}, one after the other", UserWarning, 4)
 
 
 def _is_rate(name: str) -> bool:
