@@ -193,8 +193,8 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
 
     Units, features and topics, the ``.pos`` of LeRobot's drivers, and the side of one arm of two are no part of it.
     Without such names, columns with all words of a joint are it, as ``ur5_elbow_joint_position``; or those that differ
-    from one another by the same words as the joints, as ``q1``. Names of other
-    joints of the same robot are refused then. Columns of velocities and efforts are none.
+    from one another by the same words as the joints, as ``q1``. Names of other joints of the same robot are refused
+    then. Columns of velocities and efforts are none.
     """
     names = ["" if _is_rate(name) else name for name in names]
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
@@ -217,9 +217,9 @@ def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     for columns in sides.values():
         return columns
     words, joints = [words_of(name_of(name)) for name in names], list(map(words_of, robot.joints))
-    found = _single(_holding(words, joints)) or _differing(words, joints)
-    _check_no_others([plain[k] for k in found or ()], robot)
-    return found
+    columns = _single(_holding(words, joints)) or _differing(words, joints)
+    _check_no_others([plain[k] for k in columns or ()], robot)
+    return columns
 
 
 def axis_order(names: Sequence[str]) -> list[int]:
