@@ -50,8 +50,8 @@ def styles_of(studio: Studio, symbol: str) -> StyleModel:
     return studio.cached_item("styles", symbol, lambda: learn_styles(studio.library.primitives(name)))
 
 
-def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
-    """Generate the movement that is asked for, with warnings."""
+def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, Array | None, list[str]]:
+    """Generate the movement that is asked for; with the goal that it was given, and warnings."""
     learned = learned_as(studio, body)
     duration = body.duration or float(learned.primitive.durations[0])
     rate = body.rate or _SAMPLES / duration
@@ -69,7 +69,7 @@ def make(studio: Studio, body: RolloutRequest) -> tuple[Generated, list[str]]:
         via=tuple((share, np.array(point)) for share, point in sorted(body.via, key=lambda pair: pair[0])),
     )
     movement, warnings = _around(learned, options, body.obstacles)
-    return movement, notes + warnings
+    return movement, points["goal"], notes + warnings
 
 
 def _points(learned: Learned, body: RolloutRequest) -> tuple[dict[str, Array | None], list[str]]:
@@ -292,9 +292,9 @@ def rollout(studio: Reads, body: RolloutRequest) -> dict[str, Any]:
 
     Its columns are those that a start and a goal have; the steps of a gripper are in the file that is exported.
     """
-    (movement, warnings), learned = make(studio, body), learned_as(studio, body)
+    (movement, goal, warnings), learned = make(studio, body), learned_as(studio, body)
     columns, recording = movement.columns, learned.demonstration
-    positions, goal = moving_positions(learned, movement), _points(learned, body)[0]["goal"]
+    positions = moving_positions(learned, movement)
     return {
         **{name: records.numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
         "positions": records.numbers(positions),
@@ -335,7 +335,7 @@ def styles(studio: Reads, key: records.SymbolKey) -> dict[str, Any]:
 )
 def export(studio: Reads, body: ExportRequest) -> Response:
     """With times, positions, velocities and accelerations, in each format that movements are written in."""
-    movement, _ = make(studio, body)
+    movement, *_ = make(studio, body)
     ending = f".{body.format.lower().lstrip('.')}"
     data = encode_movement(movement.columns, ending, movement.names)
     return as_file(data, name_of(studio, body.what), ending)
