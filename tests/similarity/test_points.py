@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -134,6 +136,25 @@ def test_names_of_columns_tell_the_points():
     assert point_names(channels(*sensors)) == ()
     assert point_names(channels(*HANDS[:4], HANDS[5], HANDS[4])) == ()
     assert point_names(channels(*[f"joint{k}" for k in range(6)])) == ()
+
+
+def test_names_that_say_other_points_are_warned_of(tmp_path):
+    """Columns of two hands in turn are no points one after the other; and `points` counts, whatever the names say."""
+    demos = draw_points(2, 3, seed=15)
+    for i, demo in enumerate(demos):
+        table, head = np.column_stack((demo.times, demo.positions)), ",".join(["time", *HANDS])
+        np.savetxt(tmp_path / f"{i:02d}.csv", table, delimiter=",", header=head, comments="")
+    in_turn = [HANDS[k] for k in (0, 3, 1, 4, 2, 5)]
+    apart = kineme.read_recordings(tmp_path, columns=in_turn).demonstrations
+    with pytest.warns(UserWarning, match=r"compared as none: order them as \['left_hand_x', 'left_hand_y'"):
+        assert kineme.Recognizer().fit(apart, demos.labels).n_points_ == 1
+    named = kineme.read_recordings(tmp_path).demonstrations
+    with pytest.warns(UserWarning, match="names of columns say 2 points, and 3 are compared, as points=3 says"):
+        kineme.Recognizer(points=3).fit(named, demos.labels)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for points in (None, 1, 2):
+            kineme.Recognizer(points=points).fit(named, demos.labels)
 
 
 def test_hands_with_names_turn_as_one_without_an_option(tmp_path):

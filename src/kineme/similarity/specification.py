@@ -22,14 +22,15 @@ from numpy.typing import DTypeLike, NDArray
 from kineme.dmp.discrete.dmp import DMP
 from kineme.dmp.discrete.operators import encoder, forcing_matrix
 from kineme.dmp.discrete.specification import MOST_BASIS, MOST_POINTS
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError, warn
 from kineme.kernels.pair_distances import CloudSpec, ElasticSpec
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.detect import point_names
+from kineme.movements.channels.detect import point_names, points_apart
 from kineme.movements.preparation.resample import resample_by_arc_length
 from kineme.movements.preparation.smooth import Smooth, spline_matrix
+from kineme.movements.tables.layout import listed
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array, check_choice, check_count, check_number, check_switch
 
@@ -460,8 +461,18 @@ class ComparisonSpecification:
         return Procrustes(d, math.pi / 3 if self.prior is None else math.pi, self.prior, n_points)
 
     def with_points(self, channels: Channels | None) -> ComparisonSpecification:
-        """Return the specification with the number of points, which are told by the names of columns if at all."""
-        return self if self.points is not None else replace(self, points=len(point_names(channels)) or 1)
+        """Return the specification with the number of points, which are told by the names of columns if at all.
+
+        Warns `UserWarning`: names say another number of points, or columns of points that are not one after the other.
+        """
+        names = point_names(channels)
+        if self.points is None and (apart := points_apart(channels)):
+            message = "columns name points, but not one after the other, and are compared as none: order them as"
+            warn(f"{message} {listed(apart)}", UserWarning, 3)
+        if self.points not in (None, 1) and names and len(names) != self.points:
+            said = f"{len(names)} points, and {self.points} are compared, as points={self.points} says"
+            warn(f"names of columns say {said}", UserWarning, 3)
+        return self if self.points is not None else replace(self, points=len(names) or 1)
 
 
 class Compares(Protocol):

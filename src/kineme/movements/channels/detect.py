@@ -275,12 +275,25 @@ _NO_PLACES = OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "eul
 
 def point_names(channels: Channels | None) -> tuple[str, ...]:
     """Return names of the points whose x, y, z or x, y the columns are, one after the other; none of anything else."""
+    return _points_in_turn([_name_and_axis(channel) for channel in channels or ()])
+
+
+def points_apart(channels: Channels | None) -> tuple[str, ...]:
+    """Return names of columns in which the points that they name come one after the other, where they do not."""
+    of_columns = [_name_and_axis(channel) for channel in channels or ()]
+    stems = [stem for stem, _ in of_columns]
+    order = sorted(range(len(stems)), key=lambda k: (stems.index(stems[k]), of_columns[k][1]))
+    if order == sorted(order) or not _points_in_turn([of_columns[k] for k in order]):
+        return ()
+    return tuple(name_of((channels or ())[k].name) for k in order)
+
+
+def _points_in_turn(of_columns: Sequence[tuple[str, str]]) -> tuple[str, ...]:
     for axes in ("xyz", "xy"):
-        n, d = len(channels or ()), len(axes)
-        if channels is None or n < 2 * d or n % d:
+        n, d = len(of_columns), len(axes)
+        if n < 2 * d or n % d:
             continue
-        names = [_name_and_axis(channel) for channel in channels]
-        points = [names[k : k + d] for k in range(0, n, d)]
+        points = [of_columns[k : k + d] for k in range(0, n, d)]
         stems = [point[0][0] for point in points]
         if len({*stems}) == len(stems) and all(
             [axis for _, axis in point] == [*axes] and len({stem for stem, _ in point}) == 1 for point in points
