@@ -131,7 +131,7 @@ def test_a_process_that_hangs_is_ended_and_its_piece_fails(archive, tmp_path):
     assert any(unit.name.endswith("0005.csv") for unit in bad.piece.units)
     assert [json.loads(path.read_text())["reason"] for path in tmp_path.glob("failed-*")] == [bad.reason]
     assert len(outcomes) == len(plan(str(archive), SIZE).pieces)
-    again = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=1, time_limit=1.0)
+    again = map_pieces(piece_work.stuck, archive, output=tmp_path, size=SIZE, workers=1, time_limit=4.0)
     assert [outcome.state for outcome in again].count("skipped") == len(outcomes) - 1
 
 
