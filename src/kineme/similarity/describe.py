@@ -14,7 +14,8 @@ from kineme.dmp.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.errors import TrajectoryError
 from kineme.kernels.pair_distances import Shapes, pair_distances, shapes_of
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.movements.preparation.pauses import without_pauses
+from kineme.movements.preparation.glitches import without_glitches
+from kineme.movements.preparation.pauses import uninterrupted
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -86,8 +87,13 @@ def values_count(described: Described, how: ComparisonSpecification) -> bool:
 def recorded_values(demos: Demonstrations, start: int, stop: int) -> Array:
     """Return the means over each eighth of the time, and the standard deviation, of each column as it was recorded.
 
-    Shape (stop - start, d, 9), of movements start:stop.
+    Shape (stop - start, d, 9), of movements start:stop, without their glitches.
     """
+    recorded = demos.positions[demos.offsets[start] : demos.offsets[stop]]
+    clean = without_glitches(recorded, demos.offsets[start : stop + 1] - demos.offsets[start])
+    if clean is not recorded:
+        demos = Demonstrations.of_movements(replace(demos[start:stop].movements, positions=clean))
+        start, stop = 0, stop - start
     values = recorded_paths(demos, relative_rows(demos, start, stop, _VALUE_SAMPLES), start)
     means = values.reshape(len(values), demos.n_dims, N_MEANS, -1).mean(axis=3)
     return np.concatenate((means, values.std(axis=2, keepdims=True)), axis=2)
@@ -225,9 +231,9 @@ def _precision(how: ComparisonSpecification) -> DTypeLike:
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
     """Return movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
 
-    Pauses are cut short first, see `cut_pauses`.
+    Glitches are taken out, and pauses cut short first, see `uninterrupted`.
     """
-    return smooth_evenly(*_unpaused(demos, start, stop), cutoff)
+    return smooth_evenly(*_uninterrupted(demos, start, stop), cutoff)
 
 
 def detailed_paths(demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification) -> tuple[Array, Array]:
@@ -235,19 +241,21 @@ def detailed_paths(demos: Demonstrations, start: int, stop: int, how: Comparison
 
     Signals keep their rests in detail: a value that is held is part of them, as a corner is part of a path.
     """
-    unpaused = _unpaused(demos, start, stop)
-    paths = smooth_evenly(*unpaused, how.cutoff)
+    whole = _uninterrupted(demos, start, stop)
+    paths = smooth_evenly(*whole, how.cutoff)
     if how.detailed and how.are_signals(demos.n_dims):
-        unpaused = _unpaused(demos, start, stop, rests=False)
+        whole = _uninterrupted(demos, start, stop, rests=False)
     elif not how.detailed or how.cutoff is None:
         return paths, paths
-    return paths, smooth_evenly(*unpaused, how.detailed_cutoff)
+    return paths, smooth_evenly(*whole, how.detailed_cutoff)
 
 
-def _unpaused(demos: Demonstrations, start: int, stop: int, *, rests: bool = True) -> tuple[Demonstrations, int, int]:
-    """Return movements start:stop with their pauses cut short, and where they are."""
-    shorter = without_pauses(demos, start, stop, rests=rests)
-    return (demos, start, stop) if shorter is None else (shorter, 0, stop - start)
+def _uninterrupted(
+    demos: Demonstrations, start: int, stop: int, *, rests: bool = True
+) -> tuple[Demonstrations, int, int]:
+    """Return movements start:stop without glitches and with their pauses cut short, and where they are."""
+    clean = uninterrupted(demos, start, stop, rests=rests)
+    return (demos, start, stop) if clean is None else (clean, 0, stop - start)
 
 
 def smooth_evenly(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:

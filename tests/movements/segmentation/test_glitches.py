@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.movements.segmentation.table import without_glitches
+from kineme.movements.preparation.glitches import without_glitches, without_jumps
 
 
 def _with_glitch(known, at, length, size):
@@ -40,20 +40,91 @@ def test_known_movements_are_spotted_beside_a_glitch(make_recording):
     assert found == expected
 
 
+def whole(x):
+    """The positions of one movement without its glitches."""
+    return without_glitches(x, np.array([0, len(x)]))
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 0.01])
 @pytest.mark.parametrize("digits", [2, 12])
 def test_samples_on_the_path_stay_as_they_are(make_recording, noise, digits):
     for seed in range(20):
-        x = make_recording(seed, noise=noise).recording.positions.round(digits)
-        assert without_glitches(x) is x
+        recording = make_recording(seed, noise=noise).recording
+        x = recording.positions.round(digits)
+        assert whole(x) is x
+        assert without_jumps(x, np.diff(recording.times), np.inf) is x
 
 
 def test_a_step_that_does_not_return_is_no_glitch():
     x = np.repeat([[0.0], [5.0]], 50, axis=0) + np.random.default_rng(0).normal(scale=0.01, size=(100, 1))
-    np.testing.assert_array_equal(without_glitches(x), x)
+    assert whole(x) is x
 
 
 def test_samples_away_for_longer_than_three_are_a_movement():
     x = np.random.default_rng(0).normal(scale=0.01, size=(100, 1))
     x[40:44] += 5.0
-    np.testing.assert_array_equal(without_glitches(x), x)
+    assert whole(x) is x
+
+
+@pytest.mark.parametrize("length", [1, 4, 30])
+def test_zeros_in_place_of_what_was_not_seen_are_a_line(make_recording, length):
+    x = make_recording(2, n=1).recording.positions + 7.0
+    lost = x.copy()
+    middle = len(x) // 2
+    lost[middle : middle + length] = 0.0
+    found = whole(lost)
+    before, after = x[middle - 1], x[middle + length]
+    assert np.abs(found - x)[middle : middle + length].max() <= 2 * np.abs(after - before).max()
+    np.testing.assert_array_equal(
+        np.delete(found, slice(middle, middle + length), axis=0), np.delete(x, slice(middle, middle + length), axis=0)
+    )
+
+
+@pytest.mark.parametrize("at", [0, 1, 2, 97, 98, 99])
+def test_ends_of_a_movement_may_lie_apart(at):
+    """A stroke of a pen begins far from where the one before ended, and may have one sample."""
+    x = np.linspace(0.0, 1.0, 100)[:, None]
+    x[: at + 1 if at < 50 else 0] += 5.0
+    x[at if at > 50 else 100 :] += 5.0
+    assert whole(x) is x
+
+
+def test_movements_are_cleaned_one_by_one():
+    """Each as it is alone, whoever is beside it."""
+    rng = np.random.default_rng(1)
+    movements = [np.cumsum(rng.normal(size=(n, 2)), axis=0) for n in (4, 30, 5, 90)]
+    for k in (1, 3):
+        movements[k][11 : 12 + k // 2] = 1e4
+    offsets = np.cumsum([0, *map(len, movements)])
+    cleaned = without_glitches(np.concatenate(movements), offsets)
+    for movement, start, stop in zip(movements, offsets, offsets[1:], strict=False):
+        np.testing.assert_array_equal(cleaned[start:stop], whole(movement))
+    assert np.abs(cleaned).max() < 1e3
+
+
+@pytest.mark.parametrize("length", [4, 20])
+@pytest.mark.parametrize("size", [3.0, 1e3])
+def test_what_is_lost_for_longer_hides_no_movement(make_recording, length, size):
+    """A tracker that writes zeros while it sees nothing, or that finds its origin anew."""
+    known = make_recording(3, n=4, noise=0.002)
+    expected = kineme.segment(known.recording).cuts
+    for last in (150 + length, None):
+        x = known.recording.positions + size
+        x[150:last] = 0.0 if last else x[150:] + 3.0 * size
+        found = kineme.segment(kineme.Trajectory(known.recording.times, x)).cuts
+        apart = np.abs(found[:, None] - expected).max(axis=2).min(axis=0)
+        assert (apart < 0.1).sum() >= 3  # one is spoiled where the hand was lost in it
+
+
+def test_a_held_value_is_no_jump(make_recording):
+    """A sensor that is ten times slower than the recording jumps at each of its own samples."""
+    recording = make_recording(5).recording
+    x = np.repeat(recording.positions[::10], 10, axis=0)[: len(recording)]
+    assert without_jumps(x, np.diff(recording.times), np.inf) is x
+
+
+def test_a_jump_over_a_gap_in_time_was_not_seen():
+    x = np.linspace(0.0, 1.0, 100)[:, None] + 5.0 * (np.arange(100) > 50)[:, None]
+    steps = np.where(np.arange(99) == 50, 3.0, 0.01)
+    assert without_jumps(x, steps, 0.1) is x
+    assert np.ptp(without_jumps(x, steps, 5.0)) == pytest.approx(1.0, abs=0.02)

@@ -1,10 +1,11 @@
-"""Pauses within a movement, cut short: stamps far apart, and rests."""
+"""Movements as they are compared: without glitches, and with pauses cut short, stamps far apart and rests."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.preparation.glitches import without_glitches
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -33,16 +34,20 @@ _OPERATIONS, _PER_NUMBER = 60_000, 100  # of NumPy, of which many calls are need
 Parts = tuple[Array, Array, NDArray[np.intp]]
 
 
-def without_pauses(
+def uninterrupted(
     demos: Demonstrations, start: int, stop: int, allowance: float = 1.0, *, rests: bool = True
 ) -> Demonstrations | None:
-    """Movements start:stop with their pauses cut short, see `cut_pauses`; None if they have none, the usual case."""
-    offsets = demos.offsets[start : stop + 1]
-    rows = slice(int(offsets[0]), int(offsets[-1]))
-    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0], allowance, rests=rests)
-    if cut is None:
+    """Movements start:stop without glitches, see `without_glitches`, and with their pauses cut short, see `cut_pauses`.
+
+    None if they have neither, the usual case.
+    """
+    rows = slice(int(demos.offsets[start]), int(demos.offsets[stop]))
+    recorded, offsets = demos.positions[rows], demos.offsets[start : stop + 1] - demos.offsets[start]
+    clean = without_glitches(recorded, offsets)
+    cut = cut_pauses(demos.movements.spread[rows], clean, offsets, allowance, rests=rests)
+    if cut is None and clean is recorded:
         return None
-    times, positions, ends = cut
+    times, positions, ends = cut or (demos.movements.spread[rows], clean, offsets)
     durations = times[ends[1:] - 1] - times[ends[:-1]]
     return Demonstrations.of_movements(Movements(positions, ends, durations, times))
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from kineme.errors import SpecificationError
+from kineme.movements.preparation.glitches import without_glitches
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -43,7 +44,8 @@ class TrimRest:
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements without their rest."""
-        x, offsets, lengths = demonstrations.positions, demonstrations.offsets, demonstrations.lengths
+        recorded, offsets, lengths = demonstrations.positions, demonstrations.offsets, demonstrations.lengths
+        x = without_glitches(recorded, offsets)  # one sample far away would make the extent, and all else near the ends
         first, last = offsets[:-1], offsets[1:] - 1
         extent = np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)
         radius = self.tolerance * np.linalg.norm(extent, axis=1)
@@ -58,14 +60,14 @@ class TrimRest:
         still = extent.max(axis=1) == 0
         begin, end = np.where(still, first, begin), np.where(still, last, end)
         keep = (row >= np.repeat(begin, lengths)) & (row <= np.repeat(end, lengths))
-        times, recorded = demonstrations.times, demonstrations.movements.recorded
+        times, channels = demonstrations.times, demonstrations.movements.recorded
         return replace(
             demonstrations.movements,
-            positions=x[keep],
+            positions=recorded[keep],
             offsets=np.concatenate(([0], np.cumsum(end - begin + 1))),
             times=times[keep],
             durations=times[end] - times[begin],
-            recorded=None if recorded is None else recorded[keep],
+            recorded=None if channels is None else channels[keep],
         )
 
 

@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import columns_of_kinds
+from kineme.movements.preparation.glitches import without_jumps
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -32,8 +32,6 @@ _SMOOTHINGS = 6  # at most: peak speed and smoothing depend on each other, and a
 _SLOWEST = 2.0  # cycles per recording: the lowest cutoff
 _PEAK_PATH = 0.9  # of the path is covered below the peak speed
 _MIN_SAMPLES = 8  # two movements of four samples
-_GLITCH = 3  # samples, at most: what leaves the path for longer is a movement
-_GLITCH_STEPS = 10.0  # distance of a glitch from the path, in the longest steps of the path beside it, at least
 _GAP = 10  # typical steps: a longer one is a gap
 _NOISE_EXTENTS = 4.0  # a smoothed recording rests if its extent is less than this many standard deviations of noise
 
@@ -326,9 +324,9 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     White noise of variance sigma^2 per dimension, sampled at rate r, passes the smoothing spline (see `Smooth`) of
     cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
     ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the limit is taken, so a
-    clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Glitches are
-    taken out first, see `without_glitches`. The resolution is the speed that must be distinguished from rest, as a
-    share of the peak speed.
+    clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Glitches and
+    jumps are taken out first, see `without_jumps`: a step of 100 m would be most of the path, and all else would be at
+    rest beside its speed. The resolution is the speed that must be distinguished from rest, as a share of the peak.
 
     A pause may have no samples. The rate is that of the samples without such gaps, each of which counts as ten typical
     steps, and a recording rests in a gap across which it hardly moves.
@@ -337,10 +335,10 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     if len(recording) < _MIN_SAMPLES:
         raise TrajectoryError(f"{who}: expected at least {_MIN_SAMPLES} samples to cut, got {len(recording)}")
     t = recording.times - recording.times[0]
-    positions = without_glitches(recording.positions)
-    variance = noise_variance(positions)
     steps = np.diff(t)
     longest = _longest_step(steps)
+    positions = without_jumps(recording.positions, steps, longest)
+    variance = noise_variance(positions)
     clock, gaps = np.append(0.0, np.cumsum(np.minimum(steps, longest))), np.flatnonzero(steps > longest)
     rate = (len(t) - 1) / clock[-1]
     passed = np.pi**3 / np.sqrt(2) * variance / rate
@@ -382,25 +380,6 @@ def _longest_step(steps: Array) -> float:
 def steps_of(recording: Trajectory) -> Array:
     """Return the discrete columns (T, k) of a recording; none of one whose channels are not known."""
     return recording.recorded[:, columns_of_kinds(recording.channels or (), "discrete")]
-
-
-def without_glitches(positions: Array) -> Array:
-    """Positions (T, d) with the median of seven samples in place of those that leave the path at once and return.
-
-    One sample 100 m away would be most of the path, and all else would be at rest beside its speed. A glitch lasts up
-    to three samples; it lies ten times as far from the medians as these move in a step beside it, and as a typical step
-    of the recording is long. Other samples stay as they are, to the last bit.
-    """
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    typical = float(np.median(steps[steps > 0])) if steps.any() else 0.0
-    if steps.max() <= _GLITCH_STEPS * typical:
-        return positions
-    width = 2 * _GLITCH + 1
-    path = median_filter(positions, (width, 1), mode="mirror")
-    moved = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
-    beside = maximum_filter1d(moved, 2 * width + 1)
-    glitches = np.linalg.norm(positions - path, axis=1) > _GLITCH_STEPS * np.maximum(beside, typical)
-    return np.where(glitches[:, None], path, positions) if glitches.any() else positions
 
 
 def noise_deviations(positions: Array) -> Array:

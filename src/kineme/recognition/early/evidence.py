@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import pair_distances
-from kineme.movements.preparation.pauses import without_pauses
+from kineme.movements.preparation.pauses import uninterrupted
 from kineme.movements.preparation.resample import arc_length_phase, relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.trajectory import MovementsLike
@@ -171,7 +171,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
     how = comparison.specification
     wholes = detailed_paths(demos, 0, len(demos), how)
-    demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
+    demos = uninterrupted(demos, 0, len(demos), ALLOWANCE) or demos
     paths = smooth_evenly(demos, 0, len(demos), how.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
     return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations, wholes)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.kernels.pair_distances import ElasticSpec, shapes_of
 from kineme.kernels.procrustes import Procrustes
-from kineme.movements.preparation.pauses import without_pauses
+from kineme.movements.preparation.pauses import uninterrupted
 from kineme.movements.preparation.resample import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -183,7 +183,7 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     procrustes = beginning_procrustes(comparison.procrustes, early.max_angle)
     progress = np.arange(1, early.n_progress + 1) / early.n_progress
     demos = references.all_movements()
-    demos = without_pauses(demos, 0, len(demos), ALLOWANCE) or demos
+    demos = uninterrupted(demos, 0, len(demos), ALLOWANCE) or demos
     paths = smooth_paths(demos, comparison.cutoff)
     prefixes = beginnings(paths, progress, over_time=are_signals(comparison))
     described = describe_prefixes(prefixes, procrustes, signals=are_signals(comparison))

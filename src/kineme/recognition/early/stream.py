@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.incremental import IncrementalCoordinates
+from kineme.movements.preparation.glitches import without_glitches
 from kineme.movements.preparation.pauses import cut_pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -171,12 +172,12 @@ class Live:
 
     def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
         elapsed = float(samples[-1, 0] - samples[0, 0])
-        times, positions = _without_pauses(samples, ALLOWANCE)
-        how, unpaused = self._comparison.specification, _without_pauses(samples)
+        times, positions = _uninterrupted(samples, ALLOWANCE)
+        how, unpaused = self._comparison.specification, _uninterrupted(samples)
         even = _smooth(times, positions, how.cutoff)
         whole = _smooth(*unpaused, how.cutoff)
         if how.are_signals(positions.shape[1]):
-            unpaused = _without_pauses(samples, rests=False)
+            unpaused = _uninterrupted(samples, rests=False)
         details = _smooth(*unpaused, how.detailed_cutoff) if how.detailed else whole
         so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], (whole, details))
         evidence = log_evidence(self._hypotheses, so_far)
@@ -209,10 +210,11 @@ def _smooth(times: Array, positions: Array, cutoff: float | None) -> Array:
     return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
 
-def _without_pauses(samples: Array, allowance: float = 1.0, *, rests: bool = True) -> tuple[Array, Array]:
+def _uninterrupted(samples: Array, allowance: float = 1.0, *, rests: bool = True) -> tuple[Array, Array]:
     """Return times and positions of samples (k, 1 + d), as those of stored movements are described."""
-    times, positions = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
-    cut = cut_pauses(times, positions, np.array([0, len(samples)]), allowance, rests=rests)
+    times, offsets = np.ascontiguousarray(samples[:, 0]), np.array([0, len(samples)])
+    positions = without_glitches(np.ascontiguousarray(samples[:, 1:]), offsets)
+    cut = cut_pauses(times, positions, offsets, allowance, rests=rests)
     return (times, positions) if cut is None else cut[:2]
 
 
