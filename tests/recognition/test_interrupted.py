@@ -72,3 +72,30 @@ def test_drawings_by_other_people(name, development_data):
             paused = interrupted(demos[asked], seconds, at_rest, 0.002, seed)
             differences.append(np.mean(recognizer.predict(paused) == labels[asked]) - plain)
     assert np.mean(differences) > -0.01
+
+
+@pytest.mark.parametrize("length", [1, 3, 60])
+def test_what_a_tracker_lost_changes_no_answer(length):
+    """Zeros in place of samples that were not seen: one of them was most of the path, and nothing was recognized."""
+    demos = kineme.load_lasa()
+    recognizer, lost = Recognizer().fit(demos[::7]), []
+    for movement in demos[3::7]:
+        x = movement.positions + np.array([400.0, 300.0])
+        x[500 : 500 + length] = 0.0
+        lost.append(kineme.Trajectory(movement.times, x))
+    assert np.mean(recognizer.predict(lost) == demos.labels[3::7]) >= LEAST
+    beginnings = [kineme.Trajectory(one.times[:800], one.positions[:800]) for one in lost]
+    assert np.mean(recognizer.predict_partial(beginnings) == demos.labels[3::7]) >= 0.9
+
+
+def test_a_spike_of_a_sensor_changes_no_values():
+    """Of sensors the values as they were recorded count, too."""
+    demos = draw_shapes([4] * 4, 5, seed=1, spread=0.2)
+    spiked = []
+    for movement in demos:
+        x = movement.positions.copy()
+        x[40] += 20 * np.ptp(x, axis=0)
+        spiked.append(kineme.Trajectory(movement.times, x))
+    recognizer = Recognizer().fit(demos[::2])
+    probabilities = recognizer.predict_proba(demos)
+    np.testing.assert_allclose(recognizer.predict_proba(spiked), probabilities, rtol=0, atol=0.02)

@@ -43,6 +43,19 @@ interface PauseRule {
   equal: number;
   /** Difference of counts that is rounding. */
   same_count: number;
+  glitches: GlitchRule;
+}
+
+/** How glitches are taken out; see kineme.movements.preparation.glitches. */
+interface GlitchRule {
+  /** Samples of a glitch, at most. */
+  length: number;
+  /** Its distance, in steps of the path beside it and in typical ones, at least. */
+  steps: number;
+  /** Share of its distance within which the path goes on after a value that was held apart. */
+  return: number;
+  /** Movements with no longer step, in mean ones, are not searched. */
+  mean_steps: number;
 }
 
 /** How movements are rotated. */

@@ -27,7 +27,7 @@ from kineme.library.storage.symbols import symbol
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.coordinates import period_by_unit
 from kineme.movements.channels.detect import unit_of
-from kineme.movements.preparation import pauses
+from kineme.movements.preparation import glitches, pauses
 from kineme.movements.preparation.smooth import spline_matrix
 from kineme.recognition import conformal
 from kineme.recognition.answer import LEAST_CONFIDENCE, FittedRecognizer, KnownClasses, known_classes
@@ -176,12 +176,14 @@ def _row_representation(representation: Representation, n_dims: int, r: int, arr
     return row
 
 
-def pause_rule(allowance: float = 1.0) -> dict[str, float]:
-    """Return how pauses within movements are cut short; they count `allowance` times as long."""
+def pause_rule(allowance: float = 1.0) -> dict[str, Any]:
+    """Return how glitches are taken out, and pauses cut short, which count `allowance` times as long."""
     shares = _numbers(pauses, "PAUSE", "REST", "LAST_REST")
-    return {name: allowance * share for name, share in shares.items()} | _numbers(
-        pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "SAME_COUNT", "ROUNDS"
-    )
+    return {
+        **{name: allowance * share for name, share in shares.items()},
+        **_numbers(pauses, "RADIUS", "GAP", "SHORTEST", "WINDOWS", "FEWEST", "EQUAL", "SAME_COUNT", "ROUNDS"),
+        "glitches": _numbers(glitches, "LENGTH", "STEPS", "RETURN", "MEAN_STEPS"),
+    }
 
 
 def _detail_rule(how: Comparison, details: Shapes) -> dict[str, Any]:

@@ -195,3 +195,14 @@ def test_steps_take_movements_in_any_form():
     np.testing.assert_array_equal(
         preprocess([x], (Smooth(),)).positions, preprocess(Demonstrations.from_arrays([x]), (Smooth(),)).positions
     )
+
+
+def test_a_sample_far_away_makes_no_rest_of_the_rest():
+    t = np.linspace(0.0, 1.0, 120)
+    x = np.column_stack([np.sin(3 * t), t**2]) + 5.0
+    x[60] = 0.0
+    (trimmed,) = preprocess(_one(x, t), [TrimRest()])
+    x[60] = 0.5 * (x[59] + x[61])
+    (expected,) = preprocess(_one(x, t), [TrimRest()])
+    np.testing.assert_array_equal(trimmed.times, expected.times)
+    assert (trimmed.positions == 0.0).any()  # nothing that was recorded is changed

@@ -1,7 +1,7 @@
 // What movements are compared by: rows of numbers, segments and points; in single precision, as stored ones are.
 
 import { arcLengthPhase, evenPath } from "./preparation.js";
-import { withoutPauses } from "./pauses.js";
+import { uninterrupted } from "./pauses.js";
 import { interpolate, linspace, product } from "./arrays.js";
 
 const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scaled up
@@ -219,8 +219,8 @@ function angle(vectors, p, q, d) {
 
 /** A movement as it is compared: its smooth path, rows with their squared norms, and shapes. */
 export function describeMovement(movement, how, arrays) {
-  const unpaused = withoutPauses(movement, how.pauses);
-  const smooth = (cutoff, rule) => evenPath(rule ? withoutPauses(movement, rule) : unpaused, cutoff, N_POINTS);
+  const unpaused = uninterrupted(movement, how.pauses);
+  const smooth = (cutoff, rule) => evenPath(rule ? uninterrupted(movement, rule) : unpaused, cutoff, N_POINTS);
   return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 

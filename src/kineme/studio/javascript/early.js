@@ -4,7 +4,7 @@ import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js"
 import { N_POINTS, smoothly } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
 import { beginnings } from "./hypotheses.js";
-import { withoutPauses } from "./pauses.js";
+import { uninterrupted } from "./pauses.js";
 import { evenPath, movement } from "./preparation.js";
 import { bestRotation } from "./rotation.js";
 
@@ -74,11 +74,11 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
     const soFar = movement(times, positions, d, columns);
-    const active = withoutPauses(soFar, early.pauses);
+    const active = uninterrupted(soFar, early.pauses);
     const duration = active.times.at(-1) - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
-    const unpaused = withoutPauses(soFar, pauses);
-    const whole = smoothly(how, (cycles, rule) => smooth(rule ? withoutPauses(soFar, rule) : unpaused, cycles));
+    const unpaused = uninterrupted(soFar, pauses);
+    const whole = smoothly(how, (cycles, rule) => smooth(rule ? uninterrupted(soFar, rule) : unpaused, cycles));
     const elapsed = times[n - 1] - times[0];
     const evidence = logEvidence(stored, begun, whole, positions[0], duration);
     const share = shares(stored, evidence);

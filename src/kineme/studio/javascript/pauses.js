@@ -1,5 +1,12 @@
-// Pauses within a movement, cut short: stamps far apart, and rests. The same as kineme.movements.preparation.pauses,
-// whose numbers come with the snapshot.
+// Movements as they are compared: without glitches, and with pauses cut short, stamps far apart and rests. The same as
+// kineme.movements.preparation.pauses, whose numbers come with the snapshot.
+
+import { withoutGlitches } from "./glitches.js";
+
+/** The movement without glitches and pauses; the same object if it has none. @param {PauseRule} rule */
+export function uninterrupted(movement, rule) {
+  return withoutPauses(withoutGlitches(movement, rule.glitches), rule);
+}
 
 /** The movement without its pauses; the same object if it has none. @param {PauseRule} rule */
 export function withoutPauses(movement, rule) {
