@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import columns_of_kinds
-from kineme.movements.preparation.glitches import without_jumps
+from kineme.movements.preparation.glitches import without_glitches, without_jumps
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -337,7 +337,8 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     t = recording.times - recording.times[0]
     steps = np.diff(t)
     longest = _longest_step(steps)
-    positions = without_jumps(recording.positions, steps, longest)
+    positions = without_glitches(recording.positions, np.array([0, len(t)]))
+    positions = without_jumps(positions, steps, longest)
     variance = noise_variance(positions)
     clock, gaps = np.append(0.0, np.cumsum(np.minimum(steps, longest))), np.flatnonzero(steps > longest)
     rate = (len(t) - 1) / clock[-1]
