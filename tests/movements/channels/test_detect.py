@@ -6,7 +6,7 @@ import pytest
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import in_order
-from kineme.movements.channels.detect import find_channels, unit_of
+from kineme.movements.channels.detect import find_channels, unit_of, units_filled
 
 T = 50
 U = np.linspace(0, 1, T)
@@ -99,6 +99,24 @@ def test_numbered_columns_beyond_a_turn_are_no_joints():
 def test_a_column_that_wraps_is_an_angle_whatever_its_name():
     wrapped = np.mod(3 + 2 * U + np.pi, 2 * np.pi) - np.pi
     assert [one.kind for one in found("a1", "a2", columns=np.column_stack([wrapped, U]))] == ["angle", "position"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "units"),
+    [
+        ("mm", ("mm", "cm", "", "", "", "", "", "", "", "")),
+        ("deg", ("", "cm", "deg", "deg", "", "", "", "", "deg", "deg")),
+        ("%", ("%", "cm", *["%"] * 8)),
+    ],
+)
+def test_a_unit_is_given_to_columns_of_a_kind_that_has_it(unit, units):
+    heads = ("x", "y [cm]", "yaw", "psi", "qw", "qx", "qy", "qz", "joint1", "joint2")
+    columns = np.column_stack([values(head) for head in heads])
+    columns[:, 3] = (6 * U + 1) % 6.283185307179586
+    offsets = np.array([0, T])
+    assert units_filled(unit, heads, columns, offsets, {}, ()) == units
+    assert units_filled(unit, ("x", "gripper"), columns[:, :2], offsets, {}, ())[1] == ("%" if unit == "%" else "")
+    assert units_filled(unit, ("a", "b"), columns[:, :2], offsets, {}, ()) == (unit, unit)
 
 
 def test_what_the_caller_says_goes_before_heads_and_values():

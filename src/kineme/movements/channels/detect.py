@@ -99,6 +99,25 @@ def find_channels(
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
 
+def units_filled(
+    unit: str, heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given, units: Sequence[str]
+) -> tuple[str, ...]:
+    """The units of columns as `find_channels` takes them; where the file says none, `unit` if it fits their kind.
+
+    A unit of an angle fits angles, or whatever moves where there are none; a share of a range fits all; any other unit,
+    as of a length, fits positions. A gripper has no other unit than its file says, and in no file another one.
+    """
+    found = find_channels(heads, columns, offsets, given, units)
+    kinds = {head: channel.kind for channel in found for head in channel.columns}
+    quantity = getattr(unit_named(unit), "quantity", "")
+    fitting = {"angle"} if quantity == "angle" and "angle" in kinds.values() else {"position"}
+    fits = [
+        quantity == "range" or (kinds[head] in fitting and not DISCRETE_WORDS & {*words_of(head)}) for head in heads
+    ]
+    named = zip(units or [""] * len(heads), heads, fits, strict=True)
+    return tuple(said or unit_of(head) or (unit if fit else "") for said, head, fit in named)
+
+
 @lru_cache(maxsize=4096)  # the recordings of a folder have the same heads
 def unit_of(head: str) -> str | None:
     """The unit in the head of a column: the text in brackets that it ends in, or a word for an angle or a length."""
