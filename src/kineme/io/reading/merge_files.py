@@ -153,6 +153,11 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
     notes = (
         [f"read the columns of these numbers, {listed(taken[0])}: counted from 0, over all of a file"] if taken else []
     )
+    if counting := [*dict.fromkeys(head for how, _ in detected for head in how.in_blocks)]:
+        notes.append(
+            f"{first_names(counting, _NAMED)} may count movements that are read as one: the value changes after many "
+            "samples, and never back; if so, say movement=, in the shell --movement"
+        )
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
 
 

@@ -19,6 +19,7 @@ MOVEMENT_WORDS = frozenset(
     {
         "movement", "demonstration", "demo", "trial", "trajectory", "traj", "sequence", "episode", "recording",
         "segment", "repetition", "rep", "subject", "participant", "session", "user", "take", "attempt",
+        "run", "ep", "clip", "shot", "round", "iteration", "uuid", "guid",
     }
 )  # fmt: skip
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
