@@ -35,6 +35,8 @@ def found(*heads, columns=None, **given):
         (("pose.orientation.x", "pose.orientation.y", "pose.orientation.z", "pose.orientation.w"), "xyzw"),
         (("Rotation X", "Rotation Y", "Rotation Z", "Rotation W"), "xyzw"),
         (("quat_w", "quat_x", "quat_y", "quat_z"), "wxyz"),
+        (("qi", "qj", "qk", "qr"), "xyzw"),
+        (("rot_r", "rot_i", "rot_j", "rot_k"), "wxyz"),
     ],
 )
 def test_four_neighbors_of_one_name_are_a_quaternion_in_the_order_of_the_file(heads, order):
@@ -45,12 +47,14 @@ def test_four_neighbors_of_one_name_are_a_quaternion_in_the_order_of_the_file(he
 
 
 def test_names_without_the_norm_of_a_quaternion_are_positions_unless_they_say_so():
-    heads, columns = ("x", "y", "z", "w"), np.column_stack([U, U, U, U])
-    assert {one.kind for one in found(*heads, columns=columns)} == {"position"}
+    several, columns = (("x", "y", "z", "w"), ("i", "j", "k", "w"), ("I", "J", "K", "R")), np.column_stack([U, U, U, U])
+    for heads in several:
+        assert {one.kind for one in found(*heads, columns=columns)} == {"position"}
     assert [one.kind for one in found("qx", "qy", "qz", "qw", columns=columns)] == ["orientation"]
     unit = columns[:, :4] / np.linalg.norm(columns + 1, axis=1)[:, None]
     unit[:, 3] = np.sqrt(1 - (unit[:, :3] ** 2).sum(axis=1))
-    assert [one.kind for one in found(*heads, columns=unit)] == ["orientation"]
+    for heads in several:
+        assert [(one.name, one.kind) for one in found(*heads, columns=unit)] == [("orientation", "orientation")]
 
 
 def test_a_gripper_is_discrete_as_long_as_it_has_few_values():
