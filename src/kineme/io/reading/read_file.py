@@ -18,8 +18,8 @@ from kineme.io.limits import check_expanded
 from kineme.io.reading.check_block import check_block, sentinels_as_missing
 from kineme.io.reading.formats import FORMATS, OUTSIDE, Format, as_text, data_set_of, leads_out
 from kineme.io.records import Problem
-from kineme.movements.channels.column_match import in_one_unit, numbers_by_name
-from kineme.movements.channels.detect import unit_of, units_filled
+from kineme.movements.channels.column_match import in_one_unit, numbers_by_name, with_unit
+from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import excluded_numbers
 from kineme.movements.tables.layout import Block, Detected, Known, Layout, Parsed, listed
 
@@ -104,12 +104,7 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             detected, block, left_out, named_alone = parsed if layout.every is None else in_blocks(parsed, layout.every)
             block, sentinels = sentinels_as_missing(block, detected.columns)
             if layout.measured_in is not None:
-                present = np.isfinite(block.positions).all(axis=1)
-                rows = block.positions[present], np.append(0, np.cumsum(present))[block.offsets]
-                filled = units_filled(
-                    layout.measured_in, detected.columns, *rows, layout.kinds or {}, detected.measured_in
-                )
-                detected = detected._replace(measured_in=filled)
+                detected = with_unit(detected, block, layout.measured_in, layout.kinds or {})
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
         folder, stem = as_text(relative.parent.name), as_text(relative.stem)
