@@ -169,6 +169,35 @@ def test_lists_are_one_column_for_each_number_where_they_are_meant():
     assert read(lerobot).demonstrations.dimensions == ("observation.state.0", "observation.state.1")
 
 
+def test_structs_are_one_column_for_each_number_in_them():
+    pose = [{"x": x, "at": {"y": 2 * x, "name": "a"}, "gripper": x > 0.001} for x in X.tolist()]
+    for options in ({}, {"columns": ["pose.x", "pose.at.y", "pose.gripper"]}):
+        (one,) = read({"time": T, "pose": pose}, **options).demonstrations
+        assert [channel.name for channel in one.channels] == ["pose.x", "pose.at.y", "pose.gripper"]
+        np.testing.assert_array_equal(one.recorded, np.column_stack((X, 2 * X, X > 0.001)))
+    missing = read({"time": T, "pose": [None, *pose[1:]]}, skip="sample", fill_gaps=0)
+    assert missing.demonstrations.lengths.tolist() == [5]
+
+
+def test_a_row_of_lists_is_a_movement():
+    table = {"t": [T, T[:0], T[:5]], "x": [X, X[:0], X[:5] + 1], "label": ["a", "b", "c"], "goal": [[1.0]] * 3}
+    with pytest.raises(kineme.errors.DataError, match="as many values in 'goal' as in 't', row by row, got 1 and 6"):
+        read(table)
+    recordings = read(table, exclude="goal")
+    assert [(source.place, source.label) for source in recordings.sources] == [("0", "a"), ("2", "c")]
+    np.testing.assert_array_equal(recordings.demonstrations.positions[:, 0], [*X, *(X[:5] + 1)])
+
+
+def test_times_of_day_and_an_index_of_dates_without_a_name_are_times():
+    stamps = (1e9 * T).astype(np.int64)
+    for kind in (pa.time32("ms"), pa.time64("us"), pa.time64("ns")):
+        times = pa.array(stamps).cast(pa.time64("ns")).cast(kind)
+        np.testing.assert_allclose(read({"time": times, "x": X}).demonstrations.times, T)
+    dates = pa.array(stamps.astype("M8[ns]"))
+    np.testing.assert_allclose(read({"x": X, "__index_level_0__": dates}).demonstrations.times, T)
+    np.testing.assert_allclose(read({"t": 2 * T, "x": X, "__index_level_0__": dates}).demonstrations.times, 2 * T)
+
+
 def test_lists_of_other_lengths_and_missing_ones_cost_their_samples():
     rows = [[1.0, 2.0], [1.0], None, [2.0, None], [3.0, 5.0], [4.0, 4.0], [5.0, 1.0], [6.0, 9.0]]
     table = {"time": np.arange(8) / 10, "q": pa.array(rows, pa.list_(pa.float64()))}

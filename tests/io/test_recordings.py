@@ -9,6 +9,7 @@ import pytest
 
 import kineme
 import kineme.orientation
+from kineme.dmp.generation.generate import MovementOptions, generate, learn_one
 from kineme.io.reading.recordings import read_recording
 from kineme.io.writing.write_movement import WRITERS, ColumnNames, write_movement
 
@@ -168,6 +169,20 @@ def test_generated_poses_are_read_as_poses(tmp_path, ending):
     np.testing.assert_allclose(recording.recorded, rollout.positions[0], atol=1e-12)
     if ending == ".csv":
         assert path.read_text().startswith("time,x,y,z,qw,qx,qy,qz,v_x,v_y,v_z,v_q.rx,v_q.ry,v_q.rz,a_x")
+
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_units_that_heads_do_not_say_are_written(tmp_path, ending):
+    rows = np.column_stack([TIMES, PATH, 40 * PATH])
+    text = "t,x,y (left),q1,q2\ns,mm,mm,deg,deg\n" + "\n".join(",".join(map(str, row)) for row in rows.tolist())
+    (tmp_path / "a.csv").write_text(text)
+    recording = read_recording(tmp_path / "a.csv")
+    learned = learn_one(recording, kineme.DMP())
+    made = generate(learned, MovementOptions())
+    for movement in ((recording,), (learned.primitive.rollout(),), (made.columns, made.names)):
+        channels = read_recording(write_movement(tmp_path / f"x{ending}", *movement)).channels or ()
+        assert [(c.kind, c.unit) for c in channels] == [("position", "mm")] * 2 + [("angle", "deg")] * 2
+        assert channels[0].name == "x [mm]"
 
 
 def test_a_name_with_a_line_break_is_one_head_of_csv(tmp_path):

@@ -176,6 +176,22 @@ def test_stamps_that_may_be_two_units_are_refused_until_one_is_said(tmp_path, un
     np.testing.assert_allclose(np.diff(read.demonstrations[0].times), step / 1000, rtol=1e-3)
 
 
+@pytest.mark.parametrize(("step", "clear"), [(4.9, False), (0.005, True)])
+def test_stamps_that_are_two_units_in_files_of_one_logger_are_refused_until_one_is_said(tmp_path, step, clear):
+    for name, each in (("a", 5.1), ("b", step), ("c", step)):
+        frame = pd.DataFrame({"time": each * np.arange(20), "x": np.arange(20.0)})
+        frame.to_csv(tmp_path / f"{name}.csv", index=False)
+    if clear:
+        read = kineme.read_recordings(tmp_path)
+        np.testing.assert_allclose([one.duration for one in read.demonstrations], 0.019 * np.array([5.1, 5, 5]))
+    else:
+        with pytest.raises(
+            kineme.errors.DataError, match=r"'time' that is s \(in steps of 4\.9\) or ms .*; say units="
+        ):
+            kineme.read_recordings(tmp_path)
+    assert len(kineme.read_recordings(tmp_path, units="ms").problems) == 0
+
+
 def test_the_name_of_stamps_in_arrays_says_their_unit_too(tmp_path):
     x = np.column_stack((np.arange(20.0), np.arange(20.0) ** 2))
     (tmp_path / "a.json").write_text(json.dumps({"time_us": (10 * np.arange(20)).tolist(), "positions": x.tolist()}))

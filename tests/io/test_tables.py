@@ -185,8 +185,13 @@ def test_heads_that_are_not(head):
         ("time num_bodies x y", (0, (2, 3), (), None, (1,))),
         ("time observation.state.q1 action", (0, (1, 2), (), None, ())),
         ("Unnamed:_0 time x y vx vy", (1, (2, 3), (), None, (0, 4, 5))),
+        ("t x y z az el", (0, (1, 2, 3, 4, 5), (), None, ())),
+        ("t x y z az", (0, (1, 2, 3, 4), (), None, ())),
+        ("t x y z vx vy vz ax ay az", (0, (1, 2, 3), (), None, (4, 5, 6, 7, 8, 9))),
+        ("t z az", (0, (1,), (), None, (2,))),
         ("time v_x v_y", (0, (1, 2), (), None, ())),
         ("class_name movement_id time_ms x", (2, (3,), (1,), 0, ())),
+        ("run ep_id clip_number t x", (3, (4,), (0, 1, 2), None, ())),
     ],
 )
 def test_columns_find_their_roles(heads, roles):
@@ -235,6 +240,26 @@ def test_movements_of_a_long_table_may_be_interleaved_and_share_their_number_bet
     ]
     for movement in recordings.demonstrations:
         np.testing.assert_array_equal(np.column_stack((movement.times, movement.positions)), np.array(SIX))
+
+
+@pytest.mark.parametrize(
+    ("head", "values", "noted"),
+    [
+        ("cycle", "0 1 2", True), ("track_id", "7 8 9", True), ("stroke", "a b c", True), ("gripper", "0 1 2", False),
+        ("x", "0 2 3", False), ("cycle", "0 1 0", False), ("phase", "a b a", False),
+    ],
+)  # fmt: skip
+def test_a_column_that_may_count_movements_is_noted(head, values, noted):
+    rows = [(k, k**2, values.split()[k // 5]) for k in range(15)]
+    for several in (
+        read(lines(rows, f"t,p,{head}")),
+        read(lines([(*row, row[2]) for row in rows], f"t,p,{head},trial")),
+    ):
+        assert [*filter(None, several.notes)] == [
+            f"{head} may count movements that are read as one: the value changes after many samples, and never back; "
+            "if so, say movement=, in the shell --movement"
+        ] * (noted and len(several) == 1)
+    assert len(read(lines(rows, f"t,p,{head}"), movement=head)) == len({*values.split()})
 
 
 def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
@@ -311,7 +336,11 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
     ("times", "reason", "remaining"),
     [
         ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
-        ((0, 1, 2, 1.5, 1.7, 3), "got decreasing stamps 2 and 1.5 s at sample 3", [0, 1, 2, 3]),
+        (
+            (0, 1, 2, 1.5, 1.7, 3),
+            "got decreasing stamps 2 and 1.5 s at sample 3; if several movements .*, --movement",
+            [0, 1, 2, 3],
+        ),
         ((0, 1, "inf", 3, 4, 5), "expected finite times, got inf at sample 2", [0, 1, 3, 4, 5]),
         ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", None),
     ],

@@ -254,6 +254,14 @@ def test_a_rate_is_known_by_its_words_and_holds_for_all_below_it():
         read_json({"values": X.T.tolist(), "fs": 20})
 
 
+@pytest.mark.parametrize(("unit", "taken"), [("mm", "mm"), ("deg", "deg"), ("ms", None), ("nothing", None)])
+def test_the_unit_beside_the_data_is_theirs(unit, taken):
+    x = X.tolist()
+    for content in ({"fps": 50, "data": x}, {"times": T.tolist(), "positions": x}, {"data": SAMPLES}):
+        (one,) = read_json({"unit": unit, **content}).demonstrations
+        assert [channel.unit for channel in one.channels or ()] == [taken] * 2
+
+
 @pytest.mark.parametrize("y", [np.array(["a", "b", "a"]), np.array([2, 0, 2]), np.array([2.0, 0.0, 2.0])])
 def test_sets_of_movements_have_the_labels_beside_them(y):
     sets = np.stack([X, X + 1, X + 2])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -197,6 +200,17 @@ def test_joints_in_what_is_no_angle_do_not_move(tmp_path, unit, message):
     one = recorded(["time [s]", *(f"{name} [{unit}]" for name in robot.joints)], columns, tmp_path)
     with pytest.raises(TrajectoryError, match=message):
         move(one, robot, space="joints")
+
+
+def test_joints_without_a_unit_are_said_to_be_taken_as_radians(tmp_path):
+    robot, u = load("panda"), np.linspace(0, 1, 20)[:, None]
+    columns = np.hstack((3 * u, robot.rest + 0.1 * u))
+    for unit in ("", " [rad]"):
+        one = recorded(["time [s]", *(name + unit for name in robot.joints)], columns, tmp_path)
+        learned, generated = learn_one(one, kineme.DMP()), partial(generate_at, joints=robot)
+        generated(learned, joint_units="rad")
+        with pytest.warns(UserWarning, match="panda_joint7 are taken as radians") if unit == "" else nullcontext():
+            generated(learned)
 
 
 def test_a_tip_in_what_is_no_length_moves_by_the_scale_alone(tmp_path):

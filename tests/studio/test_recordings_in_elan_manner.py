@@ -156,12 +156,12 @@ def test_options_and_command():
 
 
 def test_a_unit_that_the_file_does_not_say_is_given_and_one_that_it_says_stays(tmp_path):
-    (tmp_path / "a.csv").write_text(_text([T, X], "t,x,y [cm]"))
+    (tmp_path / "a.csv").write_text(_text([T, X, T], "t,x,y [cm],yaw"))
     (plain,) = read_recordings(tmp_path / "a.csv").demonstrations
-    assert [channel.unit for channel in plain.channels] == [None, "cm"]
+    assert [channel.unit for channel in plain.channels] == [None, "cm", None]
     (measured,) = read_recordings(tmp_path / "a.csv", measured_in="mm").demonstrations
-    assert [channel.unit for channel in measured.channels] == ["mm", "mm"]
-    np.testing.assert_allclose(measured.positions, plain.positions * [1, 10])
+    assert [channel.unit for channel in measured.channels] == ["mm", "mm", None]
+    np.testing.assert_allclose(measured.positions, plain.positions * [1, 10, 1])
     with pytest.raises(SpecificationError, match="expected measured_in to be a unit"):
         read_recordings(tmp_path / "a.csv", measured_in="parsec")
 

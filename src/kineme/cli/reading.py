@@ -86,7 +86,7 @@ layout_options = under(
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
     click.option("--person-column", metavar="COLUMN", help="Column of who showed the movements of a table."),
     click.option("--units", type=_UNIT, help="Unit of the time stamps, by name or in seconds."),
-    click.option("--measured-in", metavar="UNIT", help="Unit of the coordinates of which the file says none, as mm."),
+    click.option("--measured-in", metavar="UNIT", help="Unit where files say none: mm of positions, deg of angles."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a repeated sample, or for missing values that are not filled.",

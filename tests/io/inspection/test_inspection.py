@@ -115,7 +115,7 @@ def test_gaps_and_odd_rates_are_noticed():
 
 
 def test_guesses_that_differ_between_files_are_noticed(tmp_path):
-    for name, step in (("a", 4), ("b", 6)):
+    for name, step in (("a", 0.4), ("b", 6)):
         (tmp_path / f"{name}.csv").write_text("time,x\n" + "".join(f"{k * step},{k}\n" for k in range(9)))
     inspection = inspect(read_recordings(tmp_path))
     assert "time counts in ms here, in s there, to judge by its size; give --units" in inspection.notes

@@ -6,7 +6,7 @@ import pytest
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import in_order
-from kineme.movements.channels.detect import find_channels, unit_of
+from kineme.movements.channels.detect import find_channels, unit_of, units_filled
 
 T = 50
 U = np.linspace(0, 1, T)
@@ -35,6 +35,8 @@ def found(*heads, columns=None, **given):
         (("pose.orientation.x", "pose.orientation.y", "pose.orientation.z", "pose.orientation.w"), "xyzw"),
         (("Rotation X", "Rotation Y", "Rotation Z", "Rotation W"), "xyzw"),
         (("quat_w", "quat_x", "quat_y", "quat_z"), "wxyz"),
+        (("qi", "qj", "qk", "qr"), "xyzw"),
+        (("rot_r", "rot_i", "rot_j", "rot_k"), "wxyz"),
     ],
 )
 def test_four_neighbors_of_one_name_are_a_quaternion_in_the_order_of_the_file(heads, order):
@@ -45,12 +47,14 @@ def test_four_neighbors_of_one_name_are_a_quaternion_in_the_order_of_the_file(he
 
 
 def test_names_without_the_norm_of_a_quaternion_are_positions_unless_they_say_so():
-    heads, columns = ("x", "y", "z", "w"), np.column_stack([U, U, U, U])
-    assert {one.kind for one in found(*heads, columns=columns)} == {"position"}
+    several, columns = (("x", "y", "z", "w"), ("i", "j", "k", "w"), ("I", "J", "K", "R")), np.column_stack([U, U, U, U])
+    for heads in several:
+        assert {one.kind for one in found(*heads, columns=columns)} == {"position"}
     assert [one.kind for one in found("qx", "qy", "qz", "qw", columns=columns)] == ["orientation"]
     unit = columns[:, :4] / np.linalg.norm(columns + 1, axis=1)[:, None]
     unit[:, 3] = np.sqrt(1 - (unit[:, :3] ** 2).sum(axis=1))
-    assert [one.kind for one in found(*heads, columns=unit)] == ["orientation"]
+    for heads in several:
+        assert [(one.name, one.kind) for one in found(*heads, columns=unit)] == [("orientation", "orientation")]
 
 
 def test_a_gripper_is_discrete_as_long_as_it_has_few_values():
@@ -99,6 +103,24 @@ def test_numbered_columns_beyond_a_turn_are_no_joints():
 def test_a_column_that_wraps_is_an_angle_whatever_its_name():
     wrapped = np.mod(3 + 2 * U + np.pi, 2 * np.pi) - np.pi
     assert [one.kind for one in found("a1", "a2", columns=np.column_stack([wrapped, U]))] == ["angle", "position"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "units"),
+    [
+        ("mm", ("mm", "cm", "", "", "", "", "", "", "", "")),
+        ("deg", ("", "cm", "deg", "deg", "", "", "", "", "deg", "deg")),
+        ("%", ("%", "cm", *["%"] * 8)),
+    ],
+)
+def test_a_unit_is_given_to_columns_of_a_kind_that_has_it(unit, units):
+    heads = ("x", "y [cm]", "yaw", "psi", "qw", "qx", "qy", "qz", "joint1", "joint2")
+    columns = np.column_stack([values(head) for head in heads])
+    columns[:, 3] = (6 * U + 1) % 6.283185307179586
+    offsets = np.array([0, T])
+    assert units_filled(unit, heads, columns, offsets, {}, ()) == units
+    assert units_filled(unit, ("x", "gripper"), columns[:, :2], offsets, {}, ())[1] == ("%" if unit == "%" else "")
+    assert units_filled(unit, ("a", "b"), columns[:, :2], offsets, {}, ()) == (unit, unit)
 
 
 def test_what_the_caller_says_goes_before_heads_and_values():

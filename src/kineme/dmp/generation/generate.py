@@ -15,7 +15,7 @@ from kineme.dmp.pose.pose_dmp import PoseDMP, PosePrimitives
 from kineme.dmp.recorded_as import in_recording, primitive_columns
 from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
 from kineme.io.arrays.npz import kind_of
-from kineme.io.writing.write_movement import ColumnNames, Columns
+from kineme.io.writing.write_movement import ColumnNames, Columns, names_of
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, turns_beyond
 from kineme.movements.rotations import NORM_TOLERANCE, angle_between
@@ -73,12 +73,13 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
                 f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
                 "goal and a duration nearer to those demonstrated"
             )
-    about = learned.primitive.to_recording
+    about, names = learned.primitive.to_recording, ColumnNames(learned.columns, learned.rates)
     if about is not None:
+        names = names_of(about.channels, learned.rates)
         shares = movement["times"] / duration
         movement["positions"] = in_recording(_signed(movement["positions"], learned), about, 0, shares)
         movement |= {name: movement[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
-    return Generated(movement, ColumnNames(learned.columns, learned.rates))
+    return Generated(movement, names)
 
 
 def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:

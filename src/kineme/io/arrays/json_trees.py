@@ -18,9 +18,11 @@ from kineme.io.limits import check_expanded
 from kineme.io.records import needs
 from kineme.io.ros.bags import REMEDIES, records_of_mcap, refused
 from kineme.io.tables.dialect import is_number
+from kineme.movements.channels.column_match import with_unit
 from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
+from kineme.units import is_unit_of
 
 _RECORDED = "timestamp [s]"  # head of the times of the recording
 _PER_SECOND = 1e9
@@ -29,6 +31,7 @@ _CHECKED = 2**12  # messages between two looks at the memory
 _PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of a part of a sample
 _NAMES = (*_PARTS, "label", "id")  # also of movements and samples
 _OPENPOSE = re.compile(r"\w+_keypoints_[23]d")
+_UNITS = ("unit", "units")
 _COUNT = "\0count"  # of parts without names
 _AXES = frozenset("xyz")
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
@@ -44,6 +47,14 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
         if error.msg == "Extra data" and error.colno == 1 and "\n" not in first:  # JSON lines of that ending
             return json_lines_movements(data, layout)
         raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
+    parsed = _parsed(entries, layout)
+    units = [entries[name] for name in _UNITS if isinstance(entries, Mapping) and isinstance(entries.get(name), str)]
+    if units and (is_unit_of(units[0], "length") or is_unit_of(units[0], "angle")):
+        return parsed._replace(detected=with_unit(parsed.detected, parsed.block, units[0], layout.kinds or {}))
+    return parsed
+
+
+def _parsed(entries: Any, layout: Layout) -> Parsed:
     if isinstance(entries, Mapping):
         if (frame := _frame(entries)) is not None:
             return tree_movements(_columns_of(frame), layout, "JSON", many="take")

@@ -147,8 +147,11 @@ def _reason(block: Block, i: int, k: int) -> str:
     before = times[k - 1]
     if before < times[k]:
         return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"
-    what = "duplicate" if times[k] == before else "decreasing"
-    return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}"
+    what, remedy = "duplicate", ""
+    if times[k] < before:
+        what = "decreasing"
+        remedy = "; if several movements follow each other, say which column tells them apart, movement=, --movement"
+    return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}{remedy}"
 
 
 def _keep(block: Block, mask: Flags) -> Block:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
@@ -22,16 +23,19 @@ from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
+from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.reporting.text import counted, first_names
+from kineme.units import UNITS
 from kineme.validation import Array
 
 GAP = 3.0  # steps longer than this many median steps are gaps: at least two samples are missing
 
 _NAMED = 6  # numbers that stand for no value in a note
 _RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
+_ALIKE = 10.0  # stamps of units, a thousand apart, whose steps are not as many times apart are doubtful
 _PAUSE = 1.0  # s without samples from which on a movement may be several
 
 #: Names of an array (n,) of people in an npz archive, one for each of its n movements.
@@ -111,6 +115,7 @@ class Recordings(MovementSequence):
 
 def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems: Sequence[Problem] = ()) -> Recordings:
     """Return one `Recordings` of all files read at `where` that hold movements, and of problems that came before."""
+    files = _without_unclear_times(files)
     reported = [*problems, *(problem for file in files for problem in file.problems)]
     full = [file for file in files if file.block.labels]
     if not full:
@@ -148,7 +153,38 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
     notes = (
         [f"read the columns of these numbers, {listed(taken[0])}: counted from 0, over all of a file"] if taken else []
     )
+    if counting := [*dict.fromkeys(head for how, _ in detected for head in how.in_blocks)]:
+        notes.append(
+            f"{first_names(counting, _NAMED)} may count movements that are read as one: the value changes after many "
+            "samples, and never back; if so, say movement=, in the shell --movement"
+        )
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
+
+
+def _without_unclear_times(files: Sequence[FileRead]) -> list[FileRead]:
+    """Refuse files whose stamps, below one head, are of several units to judge by their steps, which are alike."""
+    steps: dict[str, dict[str | float, list[float]]] = {}  # head of times -> unit -> the files' steps in it
+    guessed = {file.path: file.detected for file in files if file.detected.units_from in GUESSED and file.block.labels}
+    if len({how.units for how in guessed.values()}) > 1:
+        for file in files:
+            if (how := guessed.get(file.path)) is not None:
+                step = float(np.median(np.abs(np.diff(_stamps(file.block)))) / float(UNITS[str(how.units)].size))
+                steps.setdefault(str(how.time), {}).setdefault(how.units, []).append(step)
+    reasons = {}
+    for head, by_unit in steps.items():
+        ordered = sorted(by_unit.items(), key=lambda pair: min(pair[1]))
+        if any(min(more) < _ALIKE * max(less) for (_, less), (_, more) in pairwise(ordered)):
+            words = " or ".join(f"{unit} (in steps of {min(several):.4g})" for unit, several in ordered)
+            reasons[head] = (
+                f"expected times whose unit can be told, got {head!r} that is {words}, to judge by its steps, which "
+                "are too much alike; say units=, in the shell --units, or read files of each unit apart"
+            )
+    return [
+        file.without_movements(reasons[str(file.detected.time)])
+        if file.path in guessed and str(file.detected.time) in reasons
+        else file
+        for file in files
+    ]
 
 
 def demonstrations_of(

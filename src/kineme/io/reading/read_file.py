@@ -18,7 +18,7 @@ from kineme.io.limits import check_expanded
 from kineme.io.reading.check_block import check_block, sentinels_as_missing
 from kineme.io.reading.formats import FORMATS, OUTSIDE, Format, as_text, data_set_of, leads_out
 from kineme.io.records import Problem
-from kineme.movements.channels.column_match import in_one_unit, numbers_by_name
+from kineme.movements.channels.column_match import in_one_unit, numbers_by_name, with_unit
 from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import excluded_numbers
 from kineme.movements.tables.layout import Block, Detected, Known, Layout, Parsed, listed
@@ -102,12 +102,9 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
                 raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
             parsed = select_columns(parse, layout)
             detected, block, left_out, named_alone = parsed if layout.every is None else in_blocks(parsed, layout.every)
-            if layout.measured_in is not None:
-                units = detected.measured_in or [""] * len(detected.columns)
-                named = zip(units, detected.columns, strict=True)
-                filled = tuple(unit or unit_of(head) or layout.measured_in for unit, head in named)
-                detected = detected._replace(measured_in=filled)
             block, sentinels = sentinels_as_missing(block, detected.columns)
+            if layout.measured_in is not None:
+                detected = with_unit(detected, block, layout.measured_in, layout.kinds or {})
             detected, block = in_one_unit(detected._replace(sentinels=sentinels), block)
             block, problems = check_block(block, name, layout, detected.columns)
         folder, stem = as_text(relative.parent.name), as_text(relative.stem)

@@ -120,7 +120,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     every : int, optional
         Number of samples of a movement, where a file holds one after the other without a mark between them.
     measured_in : str, optional
-        Unit of the coordinates of which the file says none, such as ``"mm"`` or ``"deg"``.
+        Unit of the coordinates of which the file says none: ``"mm"`` of positions, ``"deg"`` of angles.
     join_files : bool, default False
         Whether the files of a folder that lie on one clock, as those of a phone's sensors, are one recording, see
         `kineme.io.reading.join_files`. Its label is the folder around that of the files.

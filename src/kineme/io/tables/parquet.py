@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate
 from operator import le
 from pathlib import Path
@@ -18,10 +19,10 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
 from kineme.movements.episodes import STATE
-from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.columns import LABEL_WORDS, Roles, choose_roles, excluded_numbers, is_time
 from kineme.movements.tables.layout import Layout, no_lines
-from kineme.movements.tables.table import Table, as_name
-from kineme.movements.tables.time_stamps import nanoseconds
+from kineme.movements.tables.table import Segments, Table, as_name
+from kineme.movements.tables.time_stamps import nanoseconds, words_of
 from kineme.validation import ROUNDED, Array, too_long_integer
 
 _SHOWN = 1000  # faults that are told apart; more rows than that are left to their missing numbers
@@ -29,6 +30,7 @@ _SHOWN = 1000  # faults that are told apart; more rows than that are left to the
 _DAMAGED = "expected a Parquet file, got something foreign, truncated or damaged"
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
+_INDEX = "__index_level_0__"
 _COMMANDS = frozenset({"action"})  # of LeRobot's episodes
 
 _LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
@@ -105,6 +107,10 @@ def _columns(file: Any, layout: Layout) -> tuple[tuple[str, ...], tuple[str, ...
     """Return heads and kinds of the columns of an open file, of each the column of the file, and their roles."""
     names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
     heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
+    if not any(map(is_time, heads)):  # as pandas writes an index of dates that has no name
+        heads = tuple(
+            "time" if head == _INDEX and kind == "date" else head for head, kind in zip(heads, kinds, strict=True)
+        )
     shown = _without_commands(heads, kinds, [types[k] for k in owners], layout)
     return heads, kinds, owners, choose_roles(shown, kinds, layout)
 
@@ -113,12 +119,16 @@ def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = 
     """Read the columns that have a role. Dates and durations are nanoseconds; missing values are NaN.
 
     A column of lists counts as one column for each number in them, ``state.0``, ``state.1``. Without a choice such
-    columns are coordinates only where no plain ones are, and ``observation.state`` always is. Of a path, the movements
+    columns are coordinates only where no plain ones are, and ``observation.state`` always is. Where the times are such
+    a column, each row is a movement. A struct counts as one column for each field, ``pose.x``. Of a path, the movements
     that begin in some groups of rows can be read alone, see `RowGroups`.
     """
     with damaged_as(_DAMAGED, pa.ArrowException, OSError):
         file = _open(data)
         names, types = tuple(file.schema_arrow.names), file.schema_arrow.types
+        of_lists = [name for name, kind in zip(names, types, strict=True) if is_list(kind)]
+        if part is None and (times := [name for name in of_lists if name == layout.time or is_time(name)]):
+            return _read_rows_of_movements(file, times[0], of_lists, layout)
         heads, kinds, owners, roles = _columns(file, layout)
         needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
         groups = None if part is None else row_groups(data, layout)
@@ -139,29 +149,88 @@ def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = 
         file = _open(data, read_dictionary=named)
         # Some rows at a time, refused once they take more memory than the limit. The metadata about the pages of
         # columns are not used: pyarrow ends the process if they are damaged.
-        batches, n_bytes, used = [], 0, [names[k] for k in needed]
-        for batch in _batches(file, used, groups, part):
-            n_bytes += batch.nbytes
-            check_expanded(n_bytes)
-            batches.append(batch)
-        if not any(batch.num_rows for batch in batches):
-            raise DataError("expected samples, got a table without rows")
-        table = pa.Table.from_batches(batches)
+        table = _within_memory(_batches(file, [names[k] for k in needed], groups, part))
         faults, read = dict[int, str](), dict[int, Any]()
         for k in needed:
             column = table.column(names[k])
-            if k in texts or not is_list(column.type):
+            if _is_struct(column):
+                leaves = zip(_leaves(types[k], names[k]), _parts(column), strict=True)
+                read[k] = np.column_stack(
+                    [
+                        np.full(len(values), np.nan) if _kind(kind) == "text" else _numbers(values, head)
+                        for (head, kind), values in leaves
+                    ]
+                )
+            elif k in texts or not is_list(column.type):
                 read[k] = _texts(column, names[k]) if k in texts else _numbers(column, names[k])
             else:
                 read[k], wrong = rows_of_lists(column, owners.count(k), names[k])
                 faults |= wrong
-    for k in {owners[k] for k in roles.positions if not is_list(types[owners[k]])}:
+    for k in {owners[k] for k in roles.positions if not pa.types.is_nested(types[owners[k]])}:
         if (integer := too_long_integer(table.column(names[k]).to_numpy())) is not None:
             raise DataError(f"expected numbers in {names[k]!r} that floats can hold, got {integer}{ROUNDED}")
     parts = {owner: iter(read[owner].T if read[owner].ndim > 1 else (read[owner],)) for owner in read}
     columns = [next(parts[owner]) if owner in parts else None for owner in owners]
     dated = roles.time is not None and kinds[roles.time] == "date"
     return Table(heads, columns, table.num_rows, no_lines, faults, "ns" if dated else None), roles
+
+
+def _within_memory(batches: Iterable[Any]) -> Any:
+    taken, n_bytes = [], 0
+    for batch in batches:
+        n_bytes += batch.nbytes
+        check_expanded(n_bytes)
+        taken.append(batch)
+    if not any(batch.num_rows for batch in taken):
+        raise DataError("expected samples, got a table without rows")
+    return pa.Table.from_batches(taken)
+
+
+def _read_rows_of_movements(file: Any, time: str, of_lists: Sequence[str], layout: Layout) -> tuple[Table, Roles]:
+    """Read a table of which each row is a movement, its samples in lists of one length."""
+    table = _within_memory(_batches(file, file.schema_arrow.names, None, None)).combine_chunks()
+    table.validate(full=True)  # pyarrow itself trusts the offsets of damaged files
+    excluded = {table.column_names[k] for k in excluded_numbers(table.column_names, layout.excluded)}
+    counted = [name for name in of_lists if name not in excluded]
+    lengths = {name: compute.list_value_length(table.column(name)).fill_null(0).to_numpy() for name in counted}
+    if other := [name for name in lengths if (lengths[name] != lengths[time]).any()]:
+        raise DataError(
+            f"expected as many values in {other[0]!r} as in {time!r}, row by row, got {lengths[other[0]][0]} and "
+            f"{lengths[time][0]} in the first; leave it aside with exclude=, in the shell --exclude"
+        )
+    rows = np.repeat(np.arange(table.num_rows), lengths[time])
+    columns: dict[str, Any] = {}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if name in lengths:
+            columns[name] = compute.list_flatten(column)
+        elif name in excluded or pa.types.is_nested(column.type):
+            columns[name] = pa.nulls(len(rows))
+        else:  # a long text is kept once
+            of_text = pa.types.is_string(column.type) or pa.types.is_large_string(column.type)
+            columns[name] = (column.dictionary_encode() if of_text else column).take(rows)
+    sink = io.BytesIO()
+    parquet.write_table(pa.table(columns), sink)
+    read, roles = read_parquet_table(sink.getvalue(), layout)
+    filled = np.flatnonzero(lengths[time])
+    offsets = np.append(0, np.cumsum(lengths[time][filled])).astype(np.intp)
+    return replace(read, segments=Segments(offsets, [*map(str, filled.tolist())], [None] * len(filled))), roles
+
+
+def _leaves(kind: Any, name: str) -> list[tuple[str, Any]]:
+    """Names and types of the fields of a struct, and of structs in it, as ``pose.position.x``."""
+    if not pa.types.is_struct(kind):
+        return [(name, kind)]
+    fields = [kind.field(i) for i in range(kind.num_fields)]
+    return [leaf for field in fields for leaf in _leaves(field.type, f"{name}.{field.name}")]
+
+
+def _parts(column: Any) -> list[Any]:
+    """The columns of these fields."""
+    return [part for field in column.flatten() for part in _parts(field)] if _is_struct(column) else [column]
+
+
+def _is_struct(column: Any) -> bool:
+    return bool(pa.types.is_struct(column.type))
 
 
 def _lists_to_read(file: Any, layout: Layout) -> set[str]:
@@ -201,7 +270,12 @@ def _expanded(
     heads, kinds, owners = [], [], []
     for k, (name, kind) in enumerate(zip(names, types, strict=True)):
         width = width_of(kind, file, name) if name in lists else 0
-        if 0 < width <= _WIDEST:
+        if pa.types.is_struct(kind) and not {*words_of(name)} & LABEL_WORDS - _COMMANDS:
+            leaves = _leaves(kind, name)
+            heads += [head for head, _ in leaves]
+            kinds += [_kind(of) for _, of in leaves]
+            width = len(leaves)
+        elif 0 < width <= _WIDEST:
             heads += [f"{name}.{i}" for i in range(width)]
             kinds += ["number"] * width
         else:
@@ -213,7 +287,7 @@ def _expanded(
 
 def _kind(kind: Any) -> str:
     of = pa.types
-    if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
+    if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind) or of.is_time(kind):
         return "date"
     if of.is_boolean(kind):
         return "flag"
@@ -242,6 +316,8 @@ def _text(value: Any, head: str) -> str:
 
 
 def _numbers(column: Any, head: str) -> Any:
+    if pa.types.is_time(column.type):
+        column = column.cast(pa.time64("ns")).cast(pa.int64())
     values = (column.cast(pa.uint8()) if pa.types.is_boolean(column.type) else column).to_numpy()
     if values.dtype.kind in "Mm":
         return nanoseconds(values)

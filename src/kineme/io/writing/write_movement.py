@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.arrays.arrays import COLUMNS, RATES
 from kineme.io.records import needs
-from kineme.movements.channels.channel import learned_names, recorded_names
+from kineme.movements.channels.channel import Channels, learned_names, recorded_names
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
+from kineme.movements.trajectories.presented import with_units
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.reporting.atomic import write_atomically
 from kineme.reporting.text import as_cell
@@ -106,10 +107,16 @@ def columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
     rates: Any = getattr(movement, "rate_names", None)  # of rollouts
     if trajectory.channels is not None:
-        named = ColumnNames(recorded_names(trajectory.channels), tuple(rates or learned_names(trajectory.channels)))
+        named = names_of(trajectory.channels, rates)
         return {"times": trajectory.times, "positions": trajectory.recorded, **derivatives}, named
     of_rollout = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
     return {"times": trajectory.times, "positions": trajectory.positions, **derivatives}, of_rollout
+
+
+def names_of(channels: Channels, rates: Sequence[str] | None = None) -> ColumnNames:
+    """Name the columns of channels and, by default in their order, those of their rates, with the units of both."""
+    names = recorded_names(channels), tuple(rates or learned_names(channels))
+    return ColumnNames(*(with_units(several, channels) for several in names))
 
 
 def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:

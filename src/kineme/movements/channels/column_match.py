@@ -13,7 +13,7 @@ import numpy as np
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.movements.channels.channel import Channels, recorded_names
-from kineme.movements.channels.detect import name_of, unit_of
+from kineme.movements.channels.detect import Given, name_of, unit_of, units_filled
 from kineme.movements.tables.columns import places_of
 from kineme.movements.tables.layout import Block, Detected, listed
 from kineme.movements.tables.time_stamps import words_of
@@ -135,6 +135,13 @@ def conversion(head: str, ours: str | None, wanted: str | None, known_units: boo
             else f"expected {head!r} without a unit, as the others have it, got {ours!r}; say the unit in all heads"
         )
     return None if here == there else (here, there)
+
+
+def with_unit(detected: Detected, block: Block, unit: str, given: Given) -> Detected:
+    """Columns of which the file says no unit with this one where it fits their kind, see `units_filled`."""
+    present = np.isfinite(block.positions).all(axis=1)
+    rows = block.positions[present], np.append(0, np.cumsum(present))[block.offsets]
+    return detected._replace(measured_in=units_filled(unit, detected.columns, *rows, given, detected.measured_in))
 
 
 def in_one_unit(detected: Detected, block: Block) -> tuple[Detected, Block]:

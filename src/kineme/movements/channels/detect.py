@@ -27,6 +27,8 @@ _UNIT_BESIDE_PART = re.compile(
     r"[\[(](?![wxyz\d][\])])[^\[\]()]*[\])]\s*$", re.IGNORECASE
 )  # that of quat[x] is a component
 _COMPONENT = re.compile(r"(.*?)[\W_]*([wxyz])[\])]?([\W_]?\d+)?", re.IGNORECASE)
+_IMAGINARY = re.compile(r"(.*?)[\W_]*([ijkrw])[\])]?([\W_]?\d+)?", re.IGNORECASE)  # as of w + x i + y j + z k
+_AS_AXES = str.maketrans("ijkr", "xyzw")
 _NUMBERED = re.compile(r"(.*?)[\W_]*([0-4])[\])]?")
 _NUMBERINGS = ("0123", "1234")
 
@@ -97,6 +99,25 @@ def find_channels(
     if all(channel.kind == "discrete" for channel in channels):  # then they are what moves
         return tuple(channel if k in kinds else channel._replace(kind="position") for k, channel in enumerate(channels))
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
+
+
+def units_filled(
+    unit: str, heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given, units: Sequence[str]
+) -> tuple[str, ...]:
+    """The units of columns as `find_channels` takes them; where the file says none, `unit` if it fits their kind.
+
+    A unit of an angle fits angles, or whatever moves where there are none; a share of a range fits all; any other unit,
+    as of a length, fits positions. A gripper has no other unit than its file says, and in no file another one.
+    """
+    found = find_channels(heads, columns, offsets, given, units)
+    kinds = {head: channel.kind for channel in found for head in channel.columns}
+    quantity = getattr(unit_named(unit), "quantity", "")
+    fitting = {"angle"} if quantity == "angle" and "angle" in kinds.values() else {"position"}
+    fits = [
+        quantity == "range" or (kinds[head] in fitting and not DISCRETE_WORDS & {*words_of(head)}) for head in heads
+    ]
+    named = zip(units or [""] * len(heads), heads, fits, strict=True)
+    return tuple(said or unit_of(head) or (unit if fit else "") for said, head, fit in named)
 
 
 @lru_cache(maxsize=4096)  # the recordings of a folder have the same heads
@@ -211,11 +232,14 @@ def quaternion_of(columns: Sequence[int], order: str) -> Quaternion:
 def find_quaternions(
     heads: Sequence[str], free: Sequence[int], columns: Array, offsets: NDArray[np.intp]
 ) -> list[Quaternion]:
-    """The quaternions in the columns `free`: four w, x, y, z of one name, or four that are numbered."""
+    """The quaternions in the columns `free`: four w, x, y, z or i, j, k, r of one name, or four that are numbered."""
     quaternions = []
-    for (stem, _), parts in _groups(_COMPONENT, heads, free).items():
-        if {*parts} == {*"wxyz"} and (bool(_NAMES & {*words_of(stem)}) or _unit_norms(columns[:, [*parts.values()]])):
-            quaternions.append(quaternion_of([*parts.values()], "".join(parts)))
+    groups = [*_groups(_COMPONENT, heads, free).items()]
+    groups += [item for item in _groups(_IMAGINARY, heads, free).items() if {*"ijk"} < {*item[1]}]
+    for (stem, _), parts in groups:
+        order = "".join(parts).translate(_AS_AXES)
+        if sorted(order) == [*"wxyz"] and (_NAMES & {*words_of(stem)} or _unit_norms(columns[:, [*parts.values()]])):
+            quaternions.append(quaternion_of([*parts.values()], order))
     for (stem, _), parts in _groups(_NUMBERED, heads, free).items():
         four = [parts[part] for part in sorted(parts)]
         if "".join(sorted(parts)) in _NUMBERINGS and _NAMES & {*words_of(stem)} and _unit_norms(columns[:, four]):
@@ -227,6 +251,9 @@ def shared_name(heads: Sequence[str]) -> str:
     """Return what the heads of a quaternion's columns share: "pose.orientation" of pose.orientation.x and so on."""
     head = _plain(heads[0])
     match = _COMPONENT.fullmatch(head) or _NUMBERED.fullmatch(head)
+    imaginary = [*filter(None, (_IMAGINARY.fullmatch(_plain(each)) for each in heads))]
+    if len({found[2].lower() for found in imaginary}) == len(heads):
+        match = imaginary[0]
     return ((match[1] if match else "") or "orientation") + ((match[3] or "") if match and match.re.groups > 2 else "")
 
 

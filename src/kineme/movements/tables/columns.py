@@ -19,6 +19,7 @@ MOVEMENT_WORDS = frozenset(
     {
         "movement", "demonstration", "demo", "trial", "trajectory", "traj", "sequence", "episode", "recording",
         "segment", "repetition", "rep", "subject", "participant", "session", "user", "take", "attempt",
+        "run", "ep", "clip", "shot", "round", "iteration", "uuid", "guid",
     }
 )  # fmt: skip
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
@@ -47,6 +48,7 @@ _DERIVATIVE_WORDS = frozenset(
 #: Words of columns that say how sure the position of the same name is.
 _CONFIDENCE_WORDS = frozenset({"confidence", "conf", "likelihood", "score", "visibility", "presence", "residual"})
 _AXES = frozenset("xyz")
+_BESIDE_AZ = ("el", "elevation", "x", "y", "ax", "ay")  # what tells an azimuth from an acceleration along z
 
 
 class Roles(NamedTuple):
@@ -339,8 +341,20 @@ def beside_positions(heads: Sequence[str]) -> set[str]:
     return {head for head in heads if _plain(head) in written} | {
         head
         for head, parts in words.items()
-        if noted[head] and _without(parts, noted[head]) in (places if noted[head] <= _DERIVATIVE_WORDS else points)
+        if not _is_azimuth(head, heads)
+        and noted[head]
+        and _without(parts, noted[head]) in (places if noted[head] <= _DERIVATIVE_WORDS else points)
     }
+
+
+def _is_azimuth(head: str, heads: Sequence[str]) -> bool:
+    """Tell whether ``az`` is no acceleration: beside ``el``, or beside x and y without their accelerations."""
+    words = words_of(_BRACKETS.sub("", head))
+    if "az" not in words:
+        return False
+    named = {words_of(_BRACKETS.sub("", other)) for other in heads}
+    there = {name for name in _BESIDE_AZ if tuple(name if word == "az" else word for word in words) in named}
+    return bool(there & {"el", "elevation"}) or {"x", "y"} <= there <= {"x", "y"}
 
 
 def _spelled_out(head: str) -> tuple[str, ...]:

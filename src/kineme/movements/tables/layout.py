@@ -149,6 +149,7 @@ class Detected(NamedTuple):
     person: tuple[str, ...] = ()  # the column that names who showed a movement
     named: bool = True  # False if the file does not name the coordinates
     sentinels: tuple[str, ...] = ()  # numbers that stand for no value, each with its column: "-9999 in x"
+    in_blocks: tuple[str, ...] = ()  # columns that may tell movements apart by their values, though none was told so
     converted: tuple[str, ...] = ()  # columns that are in another unit than in the file: "y_m as y [mm]"
 
 

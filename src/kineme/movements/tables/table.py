@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import Roles, choose_roles, no_time
+from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, no_time
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
@@ -26,14 +26,16 @@ from kineme.movements.tables.time_stamps import (
     seconds_of_dates,
     unit_by_size,
     unit_in_head,
+    words_of,
 )
-from kineme.validation import ROUNDED, Array, too_long_integer
+from kineme.validation import MIN_SAMPLES, ROUNDED, Array, too_long_integer
 
 # Of NumPy -> of `choose_roles`.
 _KINDS = {"b": "flag", "i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
 _NUMBERS = (Real, Decimal)
 #: Cell in lower case -> number.
 FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
+_BLOCKS = 3  # values of a column that may tell movements apart, at least
 _WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
@@ -105,9 +107,36 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         tuple(heads[k] for k in sorted((*roles.ignored, *roles.clocks))),
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
+        in_blocks=_in_blocks(table, roles, codes, rows),
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+
+
+def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArray[np.intp] | None) -> tuple[str, ...]:
+    """Heads of columns that may tell movements apart: within one they stay for some samples, then take a new value.
+
+    Three values or more, whole numbers that count on or texts that do not come back, each for as many samples as a
+    movement has at least; `codes` are the movements of the rows in the order of `rows`.
+    """
+    heads, new_movement = [], np.diff(codes) > 0
+    for k in (*roles.positions, *roles.ignored):
+        values = table.columns[k]
+        if values is None or DISCRETE_WORDS & {*words_of(table.heads[k])}:
+            continue
+        values = values if rows is None else values[rows]
+        changed = values[1:] != values[:-1]
+        inside, ends = np.flatnonzero(changed & ~new_movement), np.flatnonzero(changed | new_movement)
+        if len(inside) < _BLOCKS - 1 or np.diff([-1, *ends, len(values) - 1]).min() < MIN_SAMPLES:
+            continue
+        starts = [0, *(ends + 1)]
+        if values.dtype.kind == "O":
+            counts = len({*zip(codes[starts].tolist(), values[starts].tolist(), strict=True)}) == len(starts)
+        else:
+            counts = bool(np.all(values == np.rint(values)) and np.all(values[inside + 1] - values[inside] == 1))
+        if counts:
+            heads.append(table.heads[k])
+    return tuple(heads)
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:

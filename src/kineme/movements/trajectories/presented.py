@@ -116,7 +116,7 @@ def with_units(names: tuple[str, ...], channels: Channels | None) -> tuple[str, 
         name: channel.unit
         for channel in channels or ()
         for name in channel.columns
-        if channel.unit and unit_of(name) is None
+        if channel.unit and unit_of(name) != channel.unit
     }
     return tuple(f"{name} [{units[name]}]" if name in units else name for name in names)
 

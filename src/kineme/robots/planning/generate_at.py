@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError, warn
+from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import Scales, plane_of, roles_of, scales_of
+from kineme.robots.planning.roles import DRIVERS, Scales, plane_of, roles_of, scales_of
 from kineme.validation import Array, as_point
 
 
@@ -68,6 +70,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
     scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
+    if joints is not None and scale is None and joint_units is None:
+        _say_radians(roles.columns, joints)
     origin = start * scales.size + scales.offset if begin is None else begin[axes]
     way = None if end is None else (end[axes] - origin) / scales.size
     if displacement is not None:
@@ -93,3 +97,19 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         for columns in (roles.discrete, roles.continuous)
     )
     return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous, plane)
+
+
+def _say_radians(columns: Sequence[Channel], robot: Robot) -> None:
+    """Warn which joints are taken as radians although nothing says their unit."""
+    named = [
+        channel.name
+        for channel, native in zip(columns, robot.units, strict=False)
+        if native == "rad" and channel.unit is None and not channel.name.endswith(DRIVERS)
+    ]
+    if named or not columns:
+        warn(
+            f"{', '.join(named) or 'the joints'} are taken as radians, since nothing says their unit; if they are "
+            "degrees, say joint_units='deg', in the shell --joint-units",
+            UserWarning,
+            3,
+        )

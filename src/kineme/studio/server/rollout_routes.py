@@ -100,8 +100,8 @@ def as_file(data: bytes, name: str, ending: str) -> Response:
 
 def moving_positions(learned: Learned, movement: Generated) -> Array:
     """Select the positions that can be led elsewhere: all but discrete channels, such as a gripper's."""
-    names = list(movement.names.positions)
-    return np.asarray(movement.columns["positions"])[:, [names.index(name) for name in learned.moving_columns]]
+    places = [learned.columns.index(name) for name in learned.moving_columns]
+    return np.asarray(movement.columns["positions"])[:, places]
 
 
 def _learned(studio: Studio, what: Subject, formulation: str | None) -> Learned:
