@@ -69,13 +69,19 @@ _UNIT_WORD = re.compile(rf"[\W_]*(?<![a-z])({'|'.join(_UNIT_WORDS)})(?![a-z])", 
 
 
 def find_channels(
-    heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given, units: Sequence[str] = ()
+    heads: Sequence[str],
+    columns: Array,
+    offsets: NDArray[np.intp],
+    given: Given,
+    units: Sequence[str] = (),
+    has_others: bool = False,
 ) -> Channels:
     """The channels of movements that have the same columns.
 
     The columns of a quaternion need not be side by side in the file; those of a channel are, see `in_order`. What
     several heads in `given` begin with before a dot stands for all of them. `units` of the columns, empty where the
-    file does not say, are by default those in the heads.
+    file does not say, are by default those in the heads. Columns that are all discrete are what moves, unless the
+    movements have others beside them.
     """
     kinds, orientations = _given(heads, given)
     taken = {*kinds, *(k for orientation in orientations for k in orientation.columns)}
@@ -94,7 +100,7 @@ def find_channels(
             unit = (units[k] if units else "") or unit_of(head)
             kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets, k in numbered)
             channels.append(Channel(head, kind, (head,), unit))
-    if all(channel.kind == "discrete" for channel in channels):  # then they are what moves
+    if not has_others and all(channel.kind == "discrete" for channel in channels):
         return tuple(channel if k in kinds else channel._replace(kind="position") for k, channel in enumerate(channels))
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
@@ -142,6 +148,12 @@ def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Qua
                 f"quaternion {' or '.join(ORDERS)}, got {kind!r}"
             )
     return kinds, orientations
+
+
+def kinds_of(given: Given, columns: Sequence[str]) -> dict[str, str]:
+    """Return the given kinds that are of these columns."""
+    named = {key: {key} if key in columns else {name.strip() for name in key.split(",")} for key in given}
+    return {key: given[key] for key, names in named.items() if names <= {*columns}}
 
 
 def _columns_named(heads: Sequence[str], key: str) -> list[int]:
