@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import learned_names, recorded_names
-from kineme.movements.channels.coordinates import in_order
+from kineme.movements.channels.coordinates import canonical, in_order
 from kineme.movements.channels.detect import find_channels, unit_of
 
 T = 50
@@ -99,6 +100,29 @@ def test_numbered_columns_beyond_a_turn_are_no_joints():
 def test_a_column_that_wraps_is_an_angle_whatever_its_name():
     wrapped = np.mod(3 + 2 * U + np.pi, 2 * np.pi) - np.pi
     assert [one.kind for one in found("a1", "a2", columns=np.column_stack([wrapped, U]))] == ["angle", "position"]
+
+
+POINTING_DOWN = Rotation.from_euler(
+    "xyz", np.column_stack([np.pi - 0.2 + 0.4 * U, 0.3 * np.sin(U), 0.3 * U])
+).as_rotvec()
+
+
+@pytest.mark.parametrize(
+    ("form", "scale", "kind"),
+    [
+        ("axis_angle.{}", 1, "position"), ("rotVec_{}", 1, "position"), ("rotation_vector {} [deg]", 180, "position"),
+        ("r{}", 1, "position"), ("r{} [rad]", 1, "position"), ("r{} [deg]", 180, "position"),
+        ("r{} [rad]", [1, 1, 12], "angle"), ("r{} [rad]", [1, 0, 0], "angle"), ("rotvec_rate_{}", 1, "position"),
+    ],
+)  # fmt: skip
+def test_a_rotation_vector_is_not_three_angles_but_where_it_may_be(form, scale, kind):
+    heads = ["x", "y", "z", *(form.format(axis) for axis in "xyz")]
+    scale = np.rad2deg(1) if scale == 180 else np.array(scale)
+    columns = np.column_stack([np.column_stack([U] * 3), POINTING_DOWN * scale])
+    channels = find_channels(heads, columns, np.array([0, T]), {})
+    assert [channel.kind for channel in channels][3] == kind
+    if kind == "position":
+        np.testing.assert_array_equal(canonical(columns, np.array([0, T]), channels), columns)
 
 
 def test_what_the_caller_says_goes_before_heads_and_values():
