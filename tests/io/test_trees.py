@@ -352,6 +352,7 @@ def _landmarks(k, n=5):
         [{"landmark": _landmarks(k)} for k in range(20)],
         [_landmarks(k) for k in range(20)],
         {"fps": 30, "frames": [{"landmarks": _landmarks(k)} for k in range(20)]},
+        {"fps": 30, "frames": [{"left": _landmarks(k), "right": _landmarks(k)} for k in range(20)]},
     ],
 )
 def test_landmarks_of_frames_are_no_movements(tmp_path, content):
@@ -360,7 +361,8 @@ def test_landmarks_of_frames_are_no_movements(tmp_path, content):
         read_recordings(tmp_path / "a.json", units=0.03)
     (movement,) = read_recordings(tmp_path / "a.json", units=0.03, every=20).demonstrations
     expected = [[[mark[axis] for axis in "xyz"] for mark in _landmarks(k)] for k in range(20)]
-    np.testing.assert_array_equal(movement.positions, np.reshape(expected, (20, 15)))
+    hands = 1 + ("right" in str(content))
+    np.testing.assert_array_equal(movement.positions, np.tile(np.reshape(expected, (20, 15)), hands))
 
 
 def test_hands_of_a_frame_are_numbered_and_what_they_are_held_for_is_left_aside(tmp_path):

@@ -44,7 +44,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     if not movements:
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
-    movements = _of_one_array(movements, layout)
+    movements = _of_one_array(_of_named_arrays(movements, layout), layout)
     named_alone = len(movements) == 1 and movements[0].label is None
     # Beside others x may be a label, as of letters, but not where it is the only name.
     unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
@@ -111,6 +111,22 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
         point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
     )
     return [movements[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
+
+
+def _of_named_arrays(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
+    """Return movements that may be points under several names in each sample of one, each name by itself."""
+    parts = [movement.place.split("/") for movement in movements]
+    differing = [column for column in zip(*parts, strict=False) if len({*column}) > 1]
+    if len({*map(len, parts)}) > 1 or len(differing) != 2 or not all(map(str.isdecimal, differing[0])):
+        return movements  # not frames/0/left, frames/0/right, frames/1/left
+    several: dict[str, list[TreeMovement]] = {}
+    for name, movement in zip(differing[1], movements, strict=True):
+        several.setdefault(name, []).append(movement)
+    ones = {name: _of_one_array(group, layout) for name, group in several.items()}
+    if len({*map(len, several.values())}) > 1 or any(len(one) > 1 for one in ones.values()):
+        return movements
+    entries = {f"{name}.{head}": x for name, (one,) in ones.items() for head, x in one.entries.items()}
+    return [movements[0]._replace(place="", label=None, name=None, entries=entries)]
 
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:
