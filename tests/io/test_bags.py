@@ -186,7 +186,7 @@ def test_joints_in_another_order_and_of_other_nodes(tmp_path):
     assert problems == [
         "topic /joints: 1 message without positions",
         "topic /joints: 1 message with other columns ['a', 'c'], which share 'a'",
-        "2 samples of /joints before /joints begins or after it ends",
+        "2 samples of /joints (b, a) before /joints (finger_index_0) begins or after it ends",
     ]
 
 

@@ -116,6 +116,10 @@ def test_a_missing_number_costs_its_movement_or_its_sample():
         ("[1, 2, 3]", "got a list"),
         ('"x"', "got a str"),
         ("[[1, 2], [3]]", "differ in length"),
+        (
+            '[{"t": 0, "x": 1, "side": ["a", "b"]}, {"t": 1, "x": 2, "side": ["a", "b"]}]',
+            "of one length in 'side', each",
+        ),
         ('[{"t": 1, "x": 2}, 3]', "objects beside other values"),
         ('{"a": {"b": 1}}', "got no entry 'positions' but"),
         ("[[0, 1], [1, 2], [2, 3], [3, 4]]", "the seconds between two samples with units="),
@@ -150,6 +154,8 @@ def test_arrays_by_name_are_movements_and_their_times_stand_beside():
     np.testing.assert_allclose(recordings.demonstrations.durations, [0.9, 0.8])
     recordings = read(npz(**{"demo_0/q": X, "demo_0/t": T, "demo_1/q": X, "demo_1/t": T}), "a.npz")
     assert where(recordings) == [("demo_0", None), ("demo_1", None)]
+    with pytest.raises(DataError, match=r"first axis of 'tip', got shape \(2, 10\) beside 10 times; save tip.T"):
+        read(npz(time=T, tip=X.T), "a.npz")
     rated = read(npz(wave=X, fps=np.array(50)), "a.npz")
     np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
 

@@ -124,7 +124,7 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
                 raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
             tree[f"{head} (s)"] = seconds
         else:
-            tree[head] = _array(cells)
+            tree[head] = _array(cells, f" in {head!r}")
     return tree
 
 
@@ -274,7 +274,7 @@ def _sides(value: Any) -> list[str]:
     return [str(hand[0][key]) for hand in value for key in _SIDES if key in hand[0]]
 
 
-def _array(values: list[Any]) -> Any:
+def _array(values: list[Any], where: str = "") -> Any:
     """Return numbers as an array, NaN for null; texts as objects; nulls alone are empty texts, which are left aside."""
     nothing = all(
         value is None or (isinstance(value, list) and all(cell is None for cell in value)) for value in values
@@ -290,7 +290,8 @@ def _array(values: list[Any]) -> Any:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
-            "expected samples of one length, each a list of numbers, got rows that differ in length or hold texts"
+            f"expected samples of one length{where}, each a list of numbers, got rows that differ in length or "
+            "hold texts"
         ) from error
 
 

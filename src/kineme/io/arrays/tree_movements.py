@@ -71,6 +71,13 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
+    if all(map(is_time, names)):
+        for name, entry in first.entries.items():
+            if len(entry.shape) == 2 and first.rate is None and entry.shape[1] == first.length:
+                raise DataError(
+                    f"expected samples along the first axis of {name!r}, got shape {tuple(entry.shape)} beside "
+                    f"{first.length} times; save {name}.T"
+                )
     of_arrays = {name: heads_of_array(name, first.entries[name].shape) for name in names}
     heads = tuple(chain.from_iterable(of_arrays.values()))
     owners = tuple(name for name, several in of_arrays.items() for _ in several)

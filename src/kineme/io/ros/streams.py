@@ -21,7 +21,7 @@ from kineme.movements.channels.coordinates import period_of_channel, without_wra
 from kineme.movements.channels.detect import Given, find_channels, kinds_of
 from kineme.movements.rotations import continuous, slerp
 from kineme.movements.tables.layout import Column, listed
-from kineme.reporting.text import counted
+from kineme.reporting.text import counted, first_names
 from kineme.validation import Array
 
 SECOND = 1_000_000_000  # [ns]
@@ -281,17 +281,20 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool, kinds: Given) -> 
     inside = np.ones(len(at), dtype=bool)
     for _, (stamps, _) in others:
         inside &= (at >= stamps[0]) & (at <= stamps[-1])
-    names = ", ".join(stream.name for stream in streams[1:])
+    heads = _heads(streams)
+    several = {name for name, n in Counter(stream.name for stream in streams).items() if n > 1}
+    called = [f"{each.name} ({first_names(each.heads, 3)})" if each.name in several else each.name for each in streams]
+    names = ", ".join(called[1:])
     if not inside.any():
-        spans = ((stream.name, stamps_of(stream, of_headers)) for stream in streams)
+        spans = ((name, stamps_of(stream, of_headers)) for name, stream in zip(called, streams, strict=True))
         times = [f"{name} from {x.min() / SECOND:.12g} to {x.max() / SECOND:.12g} s" for name, x in spans]
         raise DataError(
-            f"expected samples of {first.name} and of {names} at the same time, got none: {', '.join(times)}"
+            f"expected samples of {called[0]} and of {names} at the same time, got none: {', '.join(times)}"
             + ("; if their headers are of two clocks, say time='recorded', in the shell --time recorded" * of_headers)
         )
     start = int(at[inside][0])
     seconds = (at[inside] - start) / SECOND
-    heads, values = _heads(streams), [first.values[inside]]
+    values = [first.values[inside]]
     for stream, (stamps, x) in others:
         k = sum(part.shape[1] for part in values)
         own = heads[k : k + len(stream.heads)]
@@ -301,7 +304,7 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool, kinds: Given) -> 
         values.append(values_at(seconds, (stamps - start) / SECOND, x, own, channels))
     merged = replace(first.at(inside), heads=heads, values=np.hstack(values))
     n_lost = int(len(at) - inside.sum())
-    lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
+    lost = f"{counted(n_lost, 'sample')} of {called[0]} before {names} begins or after it ends"
     return merged, [lost] if n_lost else []
 
 
