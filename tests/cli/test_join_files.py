@@ -100,6 +100,8 @@ def test_what_files_last_together_switch_and_lack_is_that_of_the_recording(tmp_p
     values = np.column_stack([np.roll(turned(t).as_quat(), 1, axis=1), (t >= BEGIN + 1).astype(float)]).tolist()
     values[20][0] = values[98][0] = values[99][0] = float("nan")
     table(tmp_path / "one" / "Hand.csv", ["qw", "qx", "qy", "qz", "gripper"], t, values)
+    t = clock(40, 0, 2)
+    table(tmp_path / "one" / "Grip.csv", ["open"], t, (t >= BEGIN + 1)[:, None].astype(float).tolist())
     t = clock(25, 0.8, 2)
     table(tmp_path / "one" / "Head.csv", ["y"], t, t[:, None].tolist())
     t = clock(1000, 0.5, 0.6)  # more in a second than all others, but short
@@ -114,6 +116,7 @@ def test_what_files_last_together_switch_and_lack_is_that_of_the_recording(tmp_p
     heads = [column for channel in one.channels for column in channel.columns]
     gripper = one.recorded[:, heads.index("Hand.gripper")]
     np.testing.assert_array_equal(gripper, one.times >= BEGIN + 1 - 1e-6)  # from that sample on
+    assert {*one.recorded[:, heads.index("Grip.open")].tolist()} == {0.0, 1.0}
     q = one.recorded[:, [heads.index(f"Hand.q{part}") for part in "wxyz"]]
     got = Rotation.from_quat(q, scalar_first=True)
     assert np.max((got.inv() * turned(one.times)).magnitude()) < 1e-3

@@ -35,6 +35,8 @@ def read(arrays, **options):
         ({"x": np.stack((X, X)), "t": T, "y": np.array([3, 4])}, ["0", "1"], "(n, T, d)"),
         ({"positions_0": X, "times_0": T, "positions_1": X, "times_1": T}, ["0", "1"], "numbered"),
         ({"x_0": X, "t_0": T}, ["0"], "numbered"),
+        ({"x_0": X, "t_0": T, "x_2": X, "t_2": T, "x_10": X, "t_10": T}, ["0", "2", "10"], "numbered"),
+        ({"positions_01": X, "times_01": T, "positions_02": X, "times_02": T}, ["01", "02"], "numbered"),
         ({"positions": np.concatenate((X, X)), "times": np.append(T, T), "offsets": [0, 5, 10]}, ["0", "1"], "offsets"),
     ],
 )

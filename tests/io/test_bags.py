@@ -140,6 +140,24 @@ def test_several_topics_are_put_side_by_side_at_the_stamps_of_the_first(tmp_path
         read_recordings(path, topic="/gripp")
 
 
+def test_angles_of_another_topic_turn_through_their_border_and_grippers_switch(tmp_path):
+    m, messages = Maker("mcap"), []
+    for ns in stamps(40, 50.0):
+        messages.append(("/arm", ns, m.joint_state(ns, ["a"], [(ns - START) / SECOND])))
+    for ns in stamps(30, 33.0):
+        t = (ns - START) / SECOND
+        wrapped = (2 + 3 * t + np.pi) % (2 * np.pi) - np.pi
+        messages.append(("/wheels", ns, m.joint_state(ns, ["wheel_joint", "other"], [wrapped, wrapped])))
+        messages.append(("/hand", ns, m.joint_state(ns, ["gripper"], [float(t > 0.5)])))
+    path = write_bag(tmp_path, "mcap", sorted(messages, key=lambda message: message[1]))
+    read = read_recordings(path, topic=["/arm", "/wheels", "/hand"], kinds={"other": "position"})
+    (movement,) = read.demonstrations
+    t, wheel, other, gripper = movement.recorded.T
+    np.testing.assert_allclose(wheel, 2 + 3 * t, atol=1e-6)
+    assert np.abs(other[1:] - other[:-1]).max() > 2  # which does not wrap, as was said
+    assert {*gripper.tolist()} == {0.0, 1.0}
+
+
 def test_equal_columns_of_two_topics_carry_the_names_of_their_topics(tmp_path):
     m, rows, other = Maker("mcap"), pose_rows(), pose_rows(seed=1)
     messages = []
@@ -168,7 +186,7 @@ def test_joints_in_another_order_and_of_other_nodes(tmp_path):
     assert problems == [
         "topic /joints: 1 message without positions",
         "topic /joints: 1 message with other columns ['a', 'c'], which share 'a'",
-        "2 samples of /joints before /joints begins or after it ends",
+        "2 samples of /joints (b, a) before /joints (finger_index_0) begins or after it ends",
     ]
 
 

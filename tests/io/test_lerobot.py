@@ -193,7 +193,15 @@ def test_stamps_within_a_tenth_of_a_millisecond_are_those_of_the_rate(tmp_path, 
 def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
     folder = write_v3(tmp_path / "set")
     change(folder, lambda frames: frames.assign(task_index=np.where(frames["frame_index"] < 3, 0, 1)))
-    assert kineme.read_recordings(folder).labels.tolist() == [TASKS[1], TASKS[1], TASKS[0]]
+    recordings = kineme.read_recordings(folder)
+    assert recordings.labels.tolist() == [TASKS[1], TASKS[1], TASKS[0]]
+    said = "expected one task, got several; labeled by that of most frames"
+    assert [problem.reason for problem in recordings.problems] == [f"episode 0, episode 1: {said}"]
+    declared = write_v2(tmp_path / "old") / "meta" / "episodes.jsonl"
+    rows = [json.loads(line) for line in declared.read_text().splitlines()]
+    declared.write_text("\n".join(json.dumps(row | {"tasks": TASKS[: 1 + row["episode_index"]]}) for row in rows))
+    recordings = kineme.read_recordings(tmp_path / "old")
+    assert [problem.reason for problem in recordings.problems] == [f"episode 1, episode 2: {said}"]
 
 
 @pytest.mark.parametrize(

@@ -171,6 +171,17 @@ def test_cells_of_texts_are_a_column_of_labels(tmp_path):
     assert [source.label for source in recordings.sources] == ["wave", "a", "nod"]  # without one, the file's name
 
 
+def test_a_matrix_of_characters_labels_cells_and_labels_that_fit_nothing_are_said(tmp_path):
+    cells = np.empty((1, 3), object)
+    cells[0, :] = CELLS_X, CELLS_X[:9], CELLS_X
+    names = ["wäve", "nod ", "stop"]
+    recordings = read_mat(tmp_path, trials=cells, dt=0.02, labels=np.array(names))
+    assert recordings.labels.tolist() == ["wäve", "nod", "stop"]
+    assert recordings.problems == ()
+    (problem,) = read_mat(tmp_path, trials=cells, dt=0.02, labels=np.array(names[:2])).problems
+    assert problem.reason.startswith("'labels': expected a label for each movement, got 2, which are not used")
+
+
 def test_matrices_with_their_own_times_win_over_the_longer_axis(tmp_path):
     few = np.arange(5) / 5
     wide = np.arange(40.0).reshape(8, 5)

@@ -79,6 +79,7 @@ def test_columns_are_named(tmp_path):
         ("a.csv", "", "a.csv: expected samples, got an empty file"),
         ("a.csv", "time,x\n0,1\n1,oops\n", "a.csv, line 3: expected a number in 'x', got 'oops'"),
         ("a.csv", "time,x\n0,1\n1\n", "a.csv, line 3: expected 2 columns, got 1"),
+        ("a.csv", "time,x\n0,1\n1,2\ntime,x\n0,1\n", "a.csv, line 4: expected numbers, got the heads again"),
         ("a.csv", "a,b\n0,1\n1,2\n", r"a.csv: expected one column of times, .* got the columns \['a', 'b'\]"),
         ("a.csv", "time,t,x\n0,1,2\n1,5,2\n", "one column of times"),
         ("a.csv", "1\n2\n3\n4\n", "at least one of positions, got one column"),

@@ -333,6 +333,13 @@ def test_other_paths_are_no_robot_sets(tmp_path, monkeypatch):
         kineme.read_recordings(tmp_path / "a.zip")
     with pytest.raises(DataError, match="expected an archive of Zarr, got a damaged one"):
         kineme.read_recordings(tmp_path / "bad.zip")
+    for name in ("zarr.json", "meta/episode_ends/zarr.json"):
+        (tmp_path / "new.zarr" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "new.zarr" / name).write_text('{"zarr_format": 3}')
+    with pytest.raises(
+        DataError, match=r"new.zarr: expected Zarr of format 2, got format 3; write it with zarr_format=2"
+    ):
+        kineme.read_recordings(tmp_path / "new.zarr")
     import numcodecs
 
     path = write_umi(tmp_path / "a.zarr", compressors=numcodecs.Blosc())

@@ -116,6 +116,10 @@ def test_a_missing_number_costs_its_movement_or_its_sample():
         ("[1, 2, 3]", "got a list"),
         ('"x"', "got a str"),
         ("[[1, 2], [3]]", "differ in length"),
+        (
+            '[{"t": 0, "x": 1, "side": ["a", "b"]}, {"t": 1, "x": 2, "side": ["a", "b"]}]',
+            "of one length in 'side', each",
+        ),
         ('[{"t": 1, "x": 2}, 3]', "objects beside other values"),
         ('{"a": {"b": 1}}', "got no entry 'positions' but"),
         ("[[0, 1], [1, 2], [2, 3], [3, 4]]", "the seconds between two samples with units="),
@@ -150,6 +154,8 @@ def test_arrays_by_name_are_movements_and_their_times_stand_beside():
     np.testing.assert_allclose(recordings.demonstrations.durations, [0.9, 0.8])
     recordings = read(npz(**{"demo_0/q": X, "demo_0/t": T, "demo_1/q": X, "demo_1/t": T}), "a.npz")
     assert where(recordings) == [("demo_0", None), ("demo_1", None)]
+    with pytest.raises(DataError, match=r"first axis of 'tip', got shape \(2, 10\) beside 10 times; save tip.T"):
+        read(npz(time=T, tip=X.T), "a.npz")
     rated = read(npz(wave=X, fps=np.array(50)), "a.npz")
     np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
 
@@ -360,6 +366,7 @@ def _landmarks(k, n=5):
         [{"landmark": _landmarks(k)} for k in range(20)],
         [_landmarks(k) for k in range(20)],
         {"fps": 30, "frames": [{"landmarks": _landmarks(k)} for k in range(20)]},
+        {"fps": 30, "frames": [{"left": _landmarks(k), "right": _landmarks(k)} for k in range(20)]},
     ],
 )
 def test_landmarks_of_frames_are_no_movements(tmp_path, content):
@@ -368,24 +375,43 @@ def test_landmarks_of_frames_are_no_movements(tmp_path, content):
         read_recordings(tmp_path / "a.json", units=0.03)
     (movement,) = read_recordings(tmp_path / "a.json", units=0.03, every=20).demonstrations
     expected = [[[mark[axis] for axis in "xyz"] for mark in _landmarks(k)] for k in range(20)]
-    np.testing.assert_array_equal(movement.positions, np.reshape(expected, (20, 15)))
+    hands = 1 + ("right" in str(content))
+    np.testing.assert_array_equal(movement.positions, np.tile(np.reshape(expected, (20, 15)), hands))
 
 
-def test_hands_of_a_frame_are_numbered_and_what_they_are_held_for_is_left_aside(tmp_path):
-    """As MediaPipe's tasks answer: of each frame a list of hands, each a list of points."""
-    held = [[{"index": 0, "score": 0.9, "categoryName": "Left"}], [{"index": 1, "score": 0.8, "categoryName": "Right"}]]
+@pytest.mark.parametrize("key", ["categoryName", "category_name"])
+@pytest.mark.parametrize("stamp", [lambda k: {"timestamp": 33 * k}, lambda k: {}])
+def test_hands_of_a_frame_are_told_apart_by_what_they_are_held_for(tmp_path, key, stamp):
+    """As MediaPipe's tasks answer: of each frame a list of hands, each a list of points, in any order."""
+    held = [[{"index": 0, "score": 0.9, key: "Left"}], [{"index": 1, "score": 0.8, key: "Right"}]]
     frames = [
-        {"timestamp": 33 * k, "landmarks": [_landmarks(k), _landmarks(k + 1)], "handedness": held} for k in range(20)
+        {**stamp(k), "landmarks": [_landmarks(k), _landmarks(k + 1)], "handedness": held, "pose": [_landmarks(k)]}
+        for k in range(20)
     ]
-    (tmp_path / "a.json").write_text(json.dumps(frames))
-    demos = read_recordings(tmp_path / "a.json").demonstrations
+    for frame in frames[5:9]:
+        frame |= {"landmarks": frame["landmarks"][::-1], "handedness": held[::-1]}
+
+    def read():
+        (tmp_path / "a.json").write_text(json.dumps({"fps": 30, "frames": frames}))
+        return read_recordings(tmp_path / "a.json").demonstrations
+
+    demos = read()
     assert demos.dimensions == tuple(
-        f"landmarks.{hand}.{k}.{axis}" for hand in (0, 1) for k in range(5) for axis in "xyz"
+        f"{hand}.{k}.{axis}"
+        for hand in ("landmarks.Left", "landmarks.Right", "pose.0")
+        for k in range(5)
+        for axis in "xyz"
     )
-    del frames[3]["landmarks"][1]
-    (tmp_path / "a.json").write_text(json.dumps(frames))
+    np.testing.assert_array_equal(demos[0].positions[1:, 0], demos[0].positions[:-1, 15])
+    frames[3]["handedness"] = [held[0], held[0]]
+    with pytest.raises(DataError, match=r"another side of each of the 2 'landmarks' .* got \['Left', 'Left'\]; corr"):
+        read()
+    for frame in frames:
+        frame |= {"landmarks": [_landmarks(0)], "handedness": held[:1]}
+    assert read().dimensions[0] == "landmarks.0.0.x"  # there is no other hand
+    frames = [{"frame": k, "landmarks": [_landmarks(k), _landmarks(k + 1)][: 1 + k]} for k in range(20)]
     with pytest.raises(DataError, match="as many 'landmarks' in each sample"):
-        read_recordings(tmp_path / "a.json")
+        read()
 
 
 def test_bodies_of_frames_are_read_beside_the_bones_between_their_joints(tmp_path):

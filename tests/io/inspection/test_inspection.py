@@ -178,6 +178,8 @@ def test_a_rotation_vector_near_half_a_turn_is_noticed_with_what_to_do(head):
 def test_degrees_of_a_rotation_vector_are_said():
     (note,) = on_rotations(["tx", "ty", "tz", "rx [deg]", "ry [deg]", "rz [deg]"], DOWN.as_rotvec(degrees=True))
     assert note.endswith("from_rotvec(r, degrees=True).as_quat()")
+    (note,) = on_rotations(["a", "b", "c", *(f"eef_rot_axis_angle.{k}" for k in range(3))], DOWN.as_rotvec())
+    assert note.startswith("eef_rot_axis_angle.0, eef_rot_axis_angle.1, ")
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import learned_names, recorded_names
-from kineme.movements.channels.coordinates import in_order
+from kineme.movements.channels.coordinates import canonical, in_order
 from kineme.movements.channels.detect import find_channels, unit_of, units_filled
 
 T = 50
@@ -121,6 +122,29 @@ def test_a_unit_is_given_to_columns_of_a_kind_that_has_it(unit, units):
     assert units_filled(unit, heads, columns, offsets, {}, ()) == units
     assert units_filled(unit, ("x", "gripper"), columns[:, :2], offsets, {}, ())[1] == ("%" if unit == "%" else "")
     assert units_filled(unit, ("a", "b"), columns[:, :2], offsets, {}, ()) == (unit, unit)
+
+
+POINTING_DOWN = Rotation.from_euler(
+    "xyz", np.column_stack([np.pi - 0.2 + 0.4 * U, 0.3 * np.sin(U), 0.3 * U])
+).as_rotvec()
+
+
+@pytest.mark.parametrize(
+    ("form", "scale", "kind"),
+    [
+        ("axis_angle.{}", 1, "position"), ("rotVec_{}", 1, "position"), ("rotation_vector {} [deg]", 180, "position"),
+        ("r{}", 1, "position"), ("r{} [rad]", 1, "position"), ("r{} [deg]", 180, "position"),
+        ("r{} [rad]", [1, 1, 12], "angle"), ("r{} [rad]", [1, 0, 0], "angle"), ("rotvec_rate_{}", 1, "position"),
+    ],
+)  # fmt: skip
+def test_a_rotation_vector_is_not_three_angles_but_where_it_may_be(form, scale, kind):
+    heads = ["x", "y", "z", *(form.format(axis) for axis in "xyz")]
+    scale = np.rad2deg(1) if scale == 180 else np.array(scale)
+    columns = np.column_stack([np.column_stack([U] * 3), POINTING_DOWN * scale])
+    channels = find_channels(heads, columns, np.array([0, T]), {})
+    assert [channel.kind for channel in channels][3] == kind
+    if kind == "position":
+        np.testing.assert_array_equal(canonical(columns, np.array([0, T]), channels), columns)
 
 
 def test_what_the_caller_says_goes_before_heads_and_values():

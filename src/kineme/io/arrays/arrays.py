@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -40,7 +41,8 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     - ``positions`` (n, T, d), ``times`` (T,) or (n, T): many of equal length.
     - ``positions`` (total, d), ``times`` (total,), ``offsets`` (n + 1,): many, one after the other, as `Demonstrations`
       holds them.
-    - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length.
+    - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length. With times of each, the
+      numbers may begin elsewhere, and some may be left out.
 
     ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
     and ``z`` that are all (T,) are the coordinates of one movement; ``columns`` (d,) names the coordinates.
@@ -52,11 +54,11 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         x = np.column_stack([numbers_of(arrays[name]) for name in axes])
         others = [name for name in arrays if name not in axes and (name in _BESIDE or seconds_named(name) is not None)]
         arrays = {name: arrays[name] for name in others} | {POSITIONS[0]: x}
-    key = first_named(arrays, POSITIONS)
+    key, places = first_named(arrays, POSITIONS), None
     if key is not None:
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
-        xs, ts, how = _numbered(arrays)
+        xs, ts, how, places = _numbered(arrays)
     if ts is None and not isinstance(layout.units, float | int) and (rate := rate_of(arrays)) is not None:
         check_first_axis([x.shape for x in xs])
         ts, layout = [rate.stamps(len(x)) for x in xs], replace(layout, units="s")
@@ -65,7 +67,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
     if names is not None and names.ndim == 1 and names.dtype.kind == "U":
         columns = [str(name) for name in names.tolist()] or columns
-    named = Named(_labels(arrays, len(xs)), first_named(arrays, TIMES) or STAMP, None, columns)
+    named = Named(_labels(arrays, len(xs)), first_named(arrays, TIMES) or STAMP, places, columns)
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
 
@@ -159,7 +161,7 @@ def point_names(n_points: int, width: int) -> list[str]:
 
 def has_known_names(names: Collection[str]) -> bool:
     """Tell whether arrays have the names of `arrays_movements`, with no times of another name, or none of movements."""
-    if not any(name in names or f"{name}_0" in names for name in POSITIONS):
+    if not any(name in names or _ends_of(name, names) for name in POSITIONS):
         return all(seconds_named(name) is not None for name in {*names} - {*TIMES, *LABELS, "offsets"})
     has_times = not {*TIMES, "offsets"}.isdisjoint(names)
     return has_times or not any(is_time(name) or is_header_stamp(name) for name in names)
@@ -192,7 +194,7 @@ def _no_number(array: NDArray[Any]) -> Any:
     return array.dtype.name
 
 
-def first_named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
+def first_named(arrays: Collection[str], names: Sequence[str]) -> str | None:
     """Return the first of some names that an array has, or None."""
     return next((name for name in names if name in arrays), None)
 
@@ -229,22 +231,31 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     return np.split(x, cuts), None if t is None else np.split(t, cuts), "offsets"
 
 
-def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
-    prefix = next((name for name in POSITIONS if f"{name}_0" in arrays), None)
+def _ends_of(prefix: str, names: Collection[str]) -> list[str]:
+    """Return the numbers behind a prefix in their order, where they count movements: from 0, or with times of each."""
+    ends = [match[1] for name in names if (match := re.fullmatch(rf"{prefix}_([0-9]{{1,9}})", name))]
+    timed = [
+        end for end in ends if first_named(names, [f"{clock}_{end}" for clock in TIMES]) and f"y_{end}" not in names
+    ]
+    return sorted(ends, key=int) if "0" in ends or timed else []
+
+
+def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str, list[str]]:
+    prefix = next((name for name in POSITIONS if _ends_of(name, arrays)), None)
     if prefix is None:
         raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
-    count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
-    xs = [numbers_of(arrays[f"{prefix}_{k}"]) for k in range(count)]
+    ends = _ends_of(prefix, arrays)
+    xs = [numbers_of(arrays[f"{prefix}_{end}"]) for end in ends]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     if odd := [x.shape for x in xs if x.ndim != 2]:
         raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
-    clock = next((name for name in TIMES if f"{name}_0" in arrays), None)
+    clock = next((name for name in TIMES if any(f"{name}_{end}" in arrays for end in ends)), None)
     if clock is None:
-        return xs, None, "numbered"
+        return xs, None, "numbered", ends
     try:
-        return xs, [numbers_of(arrays[f"{clock}_{k}"], of_time=True).ravel() for k in range(count)], "numbered"
+        return xs, [numbers_of(arrays[f"{clock}_{end}"], of_time=True).ravel() for end in ends], "numbered", ends
     except KeyError as error:
-        raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
+        raise DataError(f"expected times for each of the {len(ends)} movements, got no entry {error}") from error
 
 
 def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:

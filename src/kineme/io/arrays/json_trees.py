@@ -21,7 +21,7 @@ from kineme.io.tables.dialect import is_number
 from kineme.movements.channels.column_match import with_unit
 from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed
-from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
+from kineme.movements.tables.time_stamps import is_date, seconds_of_dates, words_of
 from kineme.units import is_unit_of
 
 _RECORDED = "timestamp [s]"  # head of the times of the recording
@@ -32,7 +32,9 @@ _PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of
 _NAMES = (*_PARTS, "label", "id")  # also of movements and samples
 _OPENPOSE = re.compile(r"\w+_keypoints_[23]d")
 _UNITS = ("unit", "units")
-_COUNT = "\0count"  # of parts without names
+_COUNT, _HANDS = "\0count", "\0hands"  # of parts without names
+_SIDES = ("categoryName", "category_name")  # where MediaPipe says which hand it is, in JavaScript and in Python
+_NO_HANDS = frozenset({"pose", "face", "body"})
 _AXES = frozenset("xyz")
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
@@ -133,7 +135,7 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
                 raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
             tree[f"{head} (s)"] = seconds
         else:
-            tree[head] = _array(cells)
+            tree[head] = _array(cells, f" in {head!r}")
     return tree
 
 
@@ -202,6 +204,8 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
     for name, value in entry.items():
         if is_time(name) or counts_samples(name):
             return not isinstance(value, list)
+    if any(map(_sides, entry.values())):
+        return True
     if any(  # objects that each have a name and numbers: the points of a body at one time
         isinstance(value, list)
         and bool(value)
@@ -226,27 +230,39 @@ def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
 def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return samples with names as an array for each name, NaN where it is missing; parts by name or number."""
     flat = [_flat(sample) for sample in samples]
+    if any(count > 1 for cells in flat for name, count in cells.items() if name.endswith(_HANDS)):
+        flat = [_flat(sample, by_side=True) for sample in samples]  # they come in another order now and then
     names = dict.fromkeys(name for cells in flat for name in cells)
-    for name in [name for name in names if name.endswith(f".{_COUNT}")]:
+    for name in [name for name in names if name.endswith((_COUNT, _HANDS))]:
         del names[name]
         if len(counts := {cells[name] for cells in flat if name in cells}) > 1:
             raise DataError(
-                f"expected as many {name.removesuffix(f'.{_COUNT}')!r} in each sample, since nothing names them, got "
+                f"expected as many {name.rpartition('.')[0]!r} in each sample, since nothing names them, got "
                 f"{min(counts)} to {max(counts)}; give each a name"
             )
     check_expanded(8 * len(flat) * len(names))
     return _columns_of({name: [cells.get(name) for cells in flat] for name in names})
 
 
-def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(sample: Mapping[str, Any], by_side: bool = False) -> dict[str, Any]:
     plain: dict[str, Any] = {}
+    sides = next(filter(None, map(_sides, sample.values())), []) if by_side else []
     for name, value in sample.items():
         if isinstance(value, list) and value and all(map(_are_objects, value)):  # hands, each of many points
-            if not any("categoryName" in part for hand in value for part in hand):  # what MediaPipe holds them for
-                hands = _flat({str(k): hand for k, hand in enumerate(value)})
-                plain |= {f"{name}.{inner}": cell for inner, cell in hands.items()} | {f"{name}.{_COUNT}": len(value)}
+            if _sides(value):
+                continue
+            if sides and not _NO_HANDS & {*words_of(name)}:
+                if len({*sides}) < len(sides) or len(sides) != len(value):
+                    raise DataError(
+                        f"expected another side of each of the {len(value)} {name!r} in each sample, got {sides!r:.80}"
+                        "; correct that sample, or leave it out"
+                    )
+                hands = _flat(dict(zip(sides, value, strict=True)))
+            else:
+                hands = _flat({str(k): hand for k, hand in enumerate(value)}) | {_HANDS: len(value)}
+            plain |= {f"{name}.{inner}": cell for inner, cell in hands.items()}
         elif isinstance(value, Mapping):
-            plain |= {f"{name}.{inner}": cell for inner, cell in _flat(value).items()}
+            plain |= {f"{name}.{inner}": cell for inner, cell in _flat(value, by_side).items()}
         elif _are_objects(value):
             parts = [_name(part) for part in value]
             if None not in parts and len({*parts}) < len(parts):
@@ -262,7 +278,14 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
     return plain
 
 
-def _array(values: list[Any]) -> Any:
+def _sides(value: Any) -> list[str]:
+    """Return what MediaPipe holds each hand for; nothing of anything else."""
+    if not isinstance(value, list) or not all(map(_are_objects, value)):
+        return []
+    return [str(hand[0][key]) for hand in value for key in _SIDES if key in hand[0]]
+
+
+def _array(values: list[Any], where: str = "") -> Any:
     """Return numbers as an array, NaN for null; texts as objects; nulls alone are empty texts, which are left aside."""
     nothing = all(
         value is None or (isinstance(value, list) and all(cell is None for cell in value)) for value in values
@@ -278,7 +301,8 @@ def _array(values: list[Any]) -> Any:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
-            "expected samples of one length, each a list of numbers, got rows that differ in length or hold texts"
+            f"expected samples of one length{where}, each a list of numbers, got rows that differ in length or "
+            "hold texts"
         ) from error
 
 

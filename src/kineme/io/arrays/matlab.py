@@ -15,6 +15,7 @@ from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import Named, parsed_arrays
@@ -116,7 +117,7 @@ def _node(matrix: Matrix, order: str, taken: list[int], depth: int = 0, wanted: 
         check_expanded(taken[0])
         return numbers(matrix, order)
     if matrix.kind == TEXT:
-        return text(matrix, order)
+        return _lines(matrix, order) if matrix.dims[0] > 1 else text(matrix, order)
     if matrix.kind == CELL:
         cells = _children(matrix, order, math.prod(matrix.dims), 0)
         nodes = [_node(cell, order, taken, depth + 1, wanted) for cell in cells]
@@ -298,8 +299,20 @@ def numbers(matrix: Matrix, order: str) -> Array:
 
 def text(matrix: Matrix, order: str) -> str | None:
     """Return the content of a matrix that is one line of text, else None."""
-    content = next(elements(matrix.content, order), None) if matrix.kind == TEXT else None
-    if content is None or content.type not in _ENCODINGS or len(matrix.dims) != 2 or matrix.dims[0] != 1:
+    return _characters(matrix, order) if matrix.kind == TEXT and matrix.dims[0] == 1 else None
+
+
+def _lines(matrix: Matrix, order: str) -> NDArray[np.object_] | None:
+    """Return the lines of a matrix of characters, as `char` makes it, without the blanks behind them."""
+    characters, n_lines = _characters(matrix, order), matrix.dims[0]
+    if characters is None or len(characters) != math.prod(matrix.dims):
+        return None
+    return np.array([characters[k::n_lines].rstrip() for k in range(n_lines)], dtype=object)
+
+
+def _characters(matrix: Matrix, order: str) -> str | None:
+    content = next(elements(matrix.content, order), None)
+    if content is None or content.type not in _ENCODINGS or len(matrix.dims) != 2:
         return None
     encoding = _ENCODINGS[content.type]
     if encoding in ("utf-16", "utf-32"):

@@ -22,7 +22,17 @@ from kineme.io.arrays.arrays import (
     point_names,
     sets_or_points,
 )
-from kineme.io.arrays.trees import NAMES, SAY_STEP, STAMP, TreeMovement, as_label, is_text, movements_in
+from kineme.io.arrays.trees import (
+    NAMES,
+    SAY_STEP,
+    STAMP,
+    TreeMovement,
+    as_label,
+    is_array,
+    is_label,
+    is_text,
+    movements_in,
+)
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
@@ -44,7 +54,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     if not movements:
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
-    movements = _of_one_array(movements, layout)
+    unused = _unused_labels(tree, movements)
+    movements = _of_one_array(_of_named_arrays(movements, layout), layout)
     named_alone = len(movements) == 1 and movements[0].label is None
     # Beside others x may be a label, as of letters, but not where it is the only name.
     unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
@@ -54,11 +65,19 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     ]
     stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
     if not stamped:
-        return _bare(movements, layout, kind)._replace(named_alone=named_alone)
+        parsed = _bare(movements, layout, kind)
+        return parsed._replace(named_alone=named_alone, left_out=(*parsed.left_out, *unused))
     movements = [_with_seconds(_plainly_named(movement)) for movement in movements]
     reference = Counter(tuple(movement.entries) for movement in movements).most_common(1)[0][0]
     first = next(movement for movement in movements if tuple(movement.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
+    if all(map(is_time, names)):
+        for name, entry in first.entries.items():
+            if len(entry.shape) == 2 and first.rate is None and entry.shape[1] == first.length:
+                raise DataError(
+                    f"expected samples along the first axis of {name!r}, got shape {tuple(entry.shape)} beside "
+                    f"{first.length} times; save {name}.T"
+                )
     of_arrays = {name: heads_of_array(name, first.entries[name].shape) for name in names}
     heads = tuple(chain.from_iterable(of_arrays.values()))
     owners = tuple(name for name, several in of_arrays.items() for _ in several)
@@ -79,7 +98,19 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     detected = parsed.detected._replace(ignored=(*parsed.detected.ignored, *static))
-    return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None)
+    left_out = (*parsed.left_out, *unused)
+    return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None, left_out=left_out)
+
+
+def _unused_labels(tree: Any, movements: Sequence[TreeMovement]) -> list[str]:
+    """Say which texts that are called labels beside movements are the labels of none."""
+    used, columns = {movement.label for movement in movements}, {name for each in movements for name in each.entries}
+    return [
+        f"{name!r}: expected a label for each movement, got {len(texts)}, which are not used; save one for each"
+        for name, texts in (tree.items() if isinstance(tree, Mapping) else ())
+        if is_label(name) and len(words_of(name)) == 1 and name not in columns and is_array(texts) and is_text(texts)
+        and used.isdisjoint(_texts(texts))
+    ]  # fmt: skip
 
 
 def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
@@ -111,6 +142,22 @@ def _of_one_array(movements: list[TreeMovement], layout: Layout) -> list[TreeMov
         point_names(n_points, *width) if names == [""] else [f"{k}.{name}" for k in range(n_points) for name in names]
     )
     return [movements[0]._replace(place="", entries=dict(zip(heads, x[0].T, strict=True)))]
+
+
+def _of_named_arrays(movements: list[TreeMovement], layout: Layout) -> list[TreeMovement]:
+    """Return movements that may be points under several names in each sample of one, each name by itself."""
+    parts = [movement.place.split("/") for movement in movements]
+    differing = [column for column in zip(*parts, strict=False) if len({*column}) > 1]
+    if len({*map(len, parts)}) > 1 or len(differing) != 2 or not all(map(str.isdecimal, differing[0])):
+        return movements  # not frames/0/left, frames/0/right, frames/1/left
+    several: dict[str, list[TreeMovement]] = {}
+    for name, movement in zip(differing[1], movements, strict=True):
+        several.setdefault(name, []).append(movement)
+    ones = {name: _of_one_array(group, layout) for name, group in several.items()}
+    if len({*map(len, several.values())}) > 1 or any(len(one) > 1 for one in ones.values()):
+        return movements
+    entries = {f"{name}.{head}": x for name, (one,) in ones.items() for head, x in one.entries.items()}
+    return [movements[0]._replace(place="", label=None, name=None, entries=entries)]
 
 
 def _bare(movements: Sequence[TreeMovement], layout: Layout, kind: str) -> Parsed:

@@ -23,6 +23,8 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded, check_in_passing
 from kineme.io.records import damaged_as, needs
 
+#: What only a store of format 3 has at its top.
+FORMAT_3 = "zarr.json"
 _META = ".zarray"
 _ARRAY = r"[^/]+/[^/]+/\.zarray"
 _LONGEST = 2**16  # bytes of the description of an array
@@ -135,6 +137,8 @@ def zarr_arrays(path: Path) -> Iterator[dict[str, ZarrArray | DataError]]:
 
 
 def _opened(files: _Files) -> dict[str, ZarrArray | DataError]:
+    if not files.arrays and files.has(FORMAT_3):
+        raise DataError("expected Zarr of format 2, got format 3; write it with zarr_format=2")
     arrays: dict[str, ZarrArray | DataError] = {}
     for name in files.arrays:
         try:

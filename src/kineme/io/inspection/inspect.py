@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,9 +18,9 @@ from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
 from kineme.movements.channels.coordinates import columns_of, lever_of, period_by_unit
-from kineme.movements.channels.detect import OTHER_QUANTITIES, name_of, point_names
+from kineme.movements.channels.detect import point_names, rotation_vectors
 from kineme.movements.tables.layout import Detected
-from kineme.movements.tables.time_stamps import GUESSED, words_of
+from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, first_names, printable
@@ -40,8 +39,6 @@ _END = re.compile(r"[\W\d_]*([\[(][^\[\]()]*[\])]\s*)?$")  # number and unit
 
 _STAMP = 1e-6  # times since the start are equal if they differ by less than this share of the duration
 
-#: Ends of the names of a place and, after it, of a rotation vector; the last are those of ``actual_TCP_pose_0``.
-_POSES = (("x", "y", "z", "rx", "ry", "rz"), ("tx", "ty", "tz", "rx", "ry", "rz"), tuple("012345"))
 _MANY, _NAMED = 7, 12  # columns from which on still ones are counted; channels that a note names
 
 
@@ -238,18 +235,16 @@ def _notes_on_points(demos: Demonstrations) -> list[str]:
 
 
 def _notes_on_rotation_vectors(demos: Demonstrations) -> list[str]:
-    """Say which columns beside a place are a rotation vector, by their names, and by norms that come to half a turn."""
+    """Say which columns are a rotation vector, by their names, and by norms that come to half a turn."""
     channels, notes = demos.channels or (), list[str]()
-    named = {words_of(name_of(channel.name)): k for k, channel in enumerate(channels)}
-    for stem, ends in product(dict.fromkeys(words[:-1] for words in named), _POSES):
-        pose = [named.get((*stem, end), -1) for end in ends]
-        if -1 in pose or {*stem} & {"joint", *OTHER_QUANTITIES} or (ends[0] == "0" and "pose" not in stem):
+    for three in rotation_vectors([channel.name for channel in channels]):
+        if any(channels[k].kind != "position" for k in three):
             continue
-        r = demos.recorded[:, [columns_of(channels)[k].start for k in pose[3:]]]
-        turn = period_by_unit(channels[pose[3]].unit or "rad") or 0.0
+        r = demos.recorded[:, [columns_of(channels)[k].start for k in three]]
+        turn = period_by_unit(channels[three[0]].unit or "rad") or 0.0
         if turn / 4 < np.linalg.norm(r, axis=1).max() <= turn:  # forces are larger, small rotations do not jump
             notes.append(
-                f"{', '.join(channels[k].name for k in pose[3:])} look like a rotation vector: near half a turn, as of "
+                f"{', '.join(channels[k].name for k in three)} look like a rotation vector: near half a turn, as of "
                 "a tool that points down, it jumps, and is learned so; write columns qx, qy, qz, qw instead, in Python "
                 f"scipy.spatial.transform.Rotation.from_rotvec(r{', degrees=True' * (turn == 360)}).as_quat()"
             )

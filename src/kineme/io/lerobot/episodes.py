@@ -247,11 +247,16 @@ def contradictions(frames: Frames, offsets: NDArray[np.intp], declared: Episodes
 def task_texts(frames: Frames, offsets: NDArray[np.intp], tasks: Mapping[int, str]) -> list[str | None]:
     """Return the task of each run of frames, the most frequent one where there are several."""
     first = frames.tasks[offsets[:-1]]
-    mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
-    for i in np.flatnonzero(mixed).tolist():
+    for i in np.flatnonzero(of_several_tasks(frames, offsets)).tolist():
         numbers, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
         first[i] = numbers[counts.argmax()]
     return [tasks.get(k) or None for k in first.tolist()]
+
+
+def of_several_tasks(frames: Frames, offsets: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Tell of each run of frames whether its task changes."""
+    first = np.repeat(frames.tasks[offsets[:-1]], np.diff(offsets))
+    return np.asarray(np.add.reduceat(frames.tasks != first, offsets[:-1]) > 0)
 
 
 def episodes(

@@ -148,6 +148,7 @@ class Episodes(NamedTuple):
     lengths: NDArray[np.int64]  # shape (n,)
     shards: list[str]  # the file or table that holds each, relative to the data set
     problems: list[str]  # what of meta/episodes could not be read
+    several: frozenset[int] = frozenset()  # numbers of episodes of which version 2 declares several tasks
 
     def by_shard(self) -> dict[str, list[int]]:
         """Return shard -> the numbers of its episodes, both in the order of the episodes."""
@@ -161,10 +162,13 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
     """Read the episodes as meta/episodes says."""
     problems: list[str] = []
     places: tuple[NDArray[np.int64], ...]
+    several: frozenset[int] = frozenset()
     if info.version == 2:
         rows = list(_lines(folder / _V2, ("episode_index", "length"), problems))
         numbers, lengths = (np.array([row[name] for row in rows], np.int64) for name in ("episode_index", "length"))
         names, places = ("episode_chunk", "episode_index"), (numbers // info.chunk, numbers)
+        tasks = ((row["episode_index"], row.get("tasks")) for row in rows)
+        several = frozenset(k for k, texts in tasks if isinstance(texts, list) and len({*map(str, texts)}) > 1)
     else:
         in_files = _SHARD if info.storage == "parquet" else ()
         numbers, lengths, *chunks_and_files = _table(folder, ("episode_index", "length", *in_files), problems)
@@ -176,7 +180,7 @@ def read_episodes(folder: Path, info: Info) -> Episodes:
     if info.storage == "lance":
         return Episodes(numbers[order], lengths[order], [info.data_path] * len(numbers), problems)
     fields = dict(zip(names, (place[order] for place in places), strict=True))
-    return Episodes(numbers[order], lengths[order], _paths(info.data_path, fields, "data_path"), problems)
+    return Episodes(numbers[order], lengths[order], _paths(info.data_path, fields, "data_path"), problems, several)
 
 
 def _paths(template: str, fields: Mapping[str, NDArray[np.int64]], key: str) -> list[str]:

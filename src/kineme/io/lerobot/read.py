@@ -13,7 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.io.lerobot.episodes import Frames, check_storage, contradictions, episodes, joined, shard_frames, task_texts
+from kineme.io.lerobot.episodes import (
+    Frames,
+    check_storage,
+    contradictions,
+    episodes,
+    joined,
+    of_several_tasks,
+    shard_frames,
+    task_texts,
+)
 from kineme.io.lerobot.info import Episodes, Info, read_episodes, read_info, read_tasks
 from kineme.io.limits import check_expanded
 from kineme.movements.episodes import STAMP_TOLERANCE, STATE, Episode, default_features, even_stamps, head_of, place_of
@@ -43,6 +52,12 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
         raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
     places = [place_of(k) for k in frames.episodes[offsets[:-1]].tolist()]
     segments = Segments(offsets, places, task_texts(frames, offsets, tasks))
+    several = of_several_tasks(frames, offsets) | np.isin(frames.episodes[offsets[:-1]], [*declared.several])
+    if several.any():
+        of_several = [places[k] for k in np.flatnonzero(several).tolist()]
+        left_out.append(
+            f"{first_names(of_several, _SHOWN)}: expected one task, got several; labeled by that of most frames"
+        )
     stamps = _stamps(frames, offsets, info.fps)
     parsed = _in_columns(info, layout, chosen, (stamps, frames.values), segments, frames.faults)
     return parsed._replace(left_out=tuple(left_out))

@@ -12,7 +12,7 @@ from kineme.errors import DataError, TrajectoryError
 from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import period_of_channel, without_wraps
-from kineme.movements.channels.detect import Given, find_channels
+from kineme.movements.channels.detect import find_channels, kinds_of
 from kineme.movements.rotations import slerp
 from kineme.movements.tables.layout import Block, Layout, Repair
 from kineme.reporting.text import counted
@@ -243,12 +243,6 @@ def _span_of_all(missing: Flags, skip: str) -> slice:
         if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, least):
             return slice(int(complete[0]), int(complete[-1]) + 1)
     return slice(0, n)
-
-
-def kinds_of(given: Given, columns: Sequence[str]) -> dict[str, str]:
-    """Return the given kinds that are of these columns."""
-    named = {key: {key} if key in columns else {name.strip() for name in key.split(",")} for key in given}
-    return {key: given[key] for key, names in named.items() if names <= {*columns}}
 
 
 def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:

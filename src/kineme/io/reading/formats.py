@@ -19,6 +19,7 @@ from kineme.io.arrays.npz import Npz, array_of_npy
 from kineme.io.arrays.robot_sets import ENDS, hdf5_or_robot_movements, zarr_movements
 from kineme.io.arrays.rows import row_movements, series_movements
 from kineme.io.arrays.tree_movements import nested, tree_movements
+from kineme.io.arrays.zarr_arrays import FORMAT_3
 from kineme.io.lerobot.info import MARKER
 from kineme.io.motion_capture.readers import read_bvh_table, read_c3d_table, read_mvnx_table
 from kineme.io.records import Contents, Problem, needs
@@ -154,6 +155,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         (f"{ENDS}/*", "data/*pos/*", "data/*state/*", "data/*action/*", "data/*angle/*", "data/*width/*"),
         Format(read_path=zarr_movements),
     ),
+    DataSet(FORMAT_3, (ENDS,), (), Format(read_path=zarr_movements)),  # refused with what to do
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
 )
 

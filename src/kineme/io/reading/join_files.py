@@ -13,10 +13,10 @@ from kineme.io.reading.column_order import sensors_of
 from kineme.io.reading.formats import Entry, as_text, name_of
 from kineme.io.reading.read_file import NO_MOVEMENTS, FileRead, select_columns, take_columns
 from kineme.io.records import Problem
-from kineme.io.ros.streams import interpolated
+from kineme.io.ros.streams import values_at
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, in_one_unit, numbers_by_name
-from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
+from kineme.movements.channels.coordinates import columns_of, in_order
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.columns import column_numbers, excluded_numbers
 from kineme.movements.tables.layout import Block, Layout, Parsed, Repair
@@ -216,24 +216,15 @@ def _part(read: FileRead, at: Array, given: Given) -> tuple[list[str], list[str]
         plain = [head.removeprefix(f"{stem}.") for head in heads]
         if all(head.startswith(f"{stem}.") for head in heads) and {*plain} <= {*detected.columns}:
             own[",".join(plain)] = kind
-    channels = find_channels(detected.columns, block.positions, block.offsets, own, detected.measured_in)
+    channels = find_channels(detected.columns, block.positions, block.offsets, own, detected.measured_in, True)
     columns = in_order(block.positions, detected.columns, channels)
-    if not any(True for _ in off_norm(columns, channels)):
-        columns = canonical(columns, block.offsets, channels)
     units = dict(zip(detected.columns, detected.measured_in or [""] * len(detected.columns), strict=True))
     names = recorded_names(channels)
     times = _times(read)
-    values = np.empty((len(at), columns.shape[1]))
-    before = np.searchsorted(times, at, side="right") - 1
+    values = values_at(at, times, columns, names, channels)
     for channel, where in zip(channels, columns_of(channels), strict=True):
-        if channel.kind == "orientation":
-            norms = np.interp(at, times, np.linalg.norm(columns[:, where], axis=1))  # what is no rotation stays none
-            turned = interpolated(at, times, columns[:, where])  # on great circles, whatever the order
-            values[:, where] = norms[:, None] * turned
-        elif channel.kind == "discrete":
-            values[:, where] = columns[before, where]
-        else:
-            values[:, where.start] = np.interp(at, times, columns[:, where.start])
+        if channel.kind == "orientation":  # what is no rotation stays none
+            values[:, where] *= np.interp(at, times, np.linalg.norm(columns[:, where], axis=1))[:, None]
     return (
         [f"{stem}.{name}" for name in names],
         [units[name] for name in names],

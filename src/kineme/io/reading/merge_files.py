@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.arrays.npz import Npz
-from kineme.io.reading.check_block import check_block, kinds_of, movement_of, take_movements
+from kineme.io.reading.check_block import check_block, movement_of, take_movements
 from kineme.io.reading.column_order import dimensions_unlike, in_one_set
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, note_on_missing
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
-from kineme.movements.channels.detect import Given, find_channels
+from kineme.movements.channels.detect import Given, find_channels, kinds_of
 from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence

@@ -17,6 +17,7 @@ from kineme.io.ros import streams as bag_streams
 from kineme.io.ros.bags import Bag, Topic, logs_beside, messages_of, open_bag
 from kineme.io.ros.choose import Edge, Step, chain, choose, connected_graph, edge_of, transforms_in
 from kineme.io.ros.number_fields import POSE, TYPES, Heads, decoder_of, nanoseconds_of, transform_row
+from kineme.movements.channels.channel import Channel
 from kineme.movements.rotations import conjugate, continuous, product, rotated
 from kineme.movements.tables.columns import Roles, column_numbers, is_no_coordinate
 from kineme.movements.tables.layout import AS_KNOWN, Layout, Parsed, listed, no_lines
@@ -27,6 +28,9 @@ from kineme.validation import MIN_SAMPLES, Array
 _COPIES = 3
 
 _CHECKED = 2**14
+
+#: The channel of `POSE` that is not interpolated linearly.
+_TURNED = (Channel("orientation", "orientation", POSE[3:], None, "xyzw"),)
 
 _CLOCKS = ("header.stamp", "recorded")  # columns of the time stamps
 
@@ -47,7 +51,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
             of_headers, reason = bag_streams.clock_of(streams)
             if str(layout.time) in _CLOCKS:
                 of_headers = layout.time == _CLOCKS[0]
-            merged, lost = bag_streams.merge_streams(streams, of_headers)
+            merged, lost = bag_streams.merge_streams(streams, of_headers, layout.kinds or {})
             stamps = [merged.recorded if merged.stamped is None else merged.stamped, merged.recorded]
             columns = [*(each / bag_streams.SECOND for each in stamps), *merged.values.T]
             what = [f"frames {parent}:{child}" for parent, child in choice.frames]
@@ -203,7 +207,7 @@ def _at(seconds: Array, start: int, stream: bag_streams.Stream, of_headers: bool
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
     stamps, values = bag_streams.in_order(stream, of_headers)
-    return bag_streams.values_at(seconds, (stamps - start) / bag_streams.SECOND, stream, values)
+    return bag_streams.values_at(seconds, (stamps - start) / bag_streams.SECOND, values, POSE, _TURNED)
 
 
 class _Group(NamedTuple):

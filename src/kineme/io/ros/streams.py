@@ -16,9 +16,12 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.ros.bags import Bag, Topic, messages_of
 from kineme.io.ros.number_fields import TYPES, Heads, decoder_of, nanoseconds_of, number_fields
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import period_of_channel, without_wraps
+from kineme.movements.channels.detect import Given, find_channels, kinds_of
 from kineme.movements.rotations import continuous, slerp
 from kineme.movements.tables.layout import Column, listed
-from kineme.reporting.text import counted
+from kineme.reporting.text import counted, first_names
 from kineme.validation import Array
 
 SECOND = 1_000_000_000  # [ns]
@@ -265,8 +268,11 @@ def stamps_of(stream: Stream, of_headers: bool) -> Stamps:
     return stream.stamped
 
 
-def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, list[str]]:
-    """Return one stream with the columns of all, at the stamps of the first while others last; and what is left out."""
+def merge_streams(streams: Sequence[Stream], of_headers: bool, kinds: Given) -> tuple[Stream, list[str]]:
+    """Return one stream with the columns of all, at the stamps of the first while others last; and what is left out.
+
+    `kinds` are those that are given for columns, by their heads in the result.
+    """
     first = streams[0]
     if len(streams) == 1:
         return first, []
@@ -275,29 +281,51 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     inside = np.ones(len(at), dtype=bool)
     for _, (stamps, _) in others:
         inside &= (at >= stamps[0]) & (at <= stamps[-1])
-    names = ", ".join(stream.name for stream in streams[1:])
+    heads = _heads(streams)
+    several = {name for name, n in Counter(stream.name for stream in streams).items() if n > 1}
+    called = [f"{each.name} ({first_names(each.heads, 3)})" if each.name in several else each.name for each in streams]
+    names = ", ".join(called[1:])
     if not inside.any():
-        spans = ((stream.name, stamps_of(stream, of_headers)) for stream in streams)
+        spans = ((name, stamps_of(stream, of_headers)) for name, stream in zip(called, streams, strict=True))
         times = [f"{name} from {x.min() / SECOND:.12g} to {x.max() / SECOND:.12g} s" for name, x in spans]
         raise DataError(
-            f"expected samples of {first.name} and of {names} at the same time, got none: {', '.join(times)}"
+            f"expected samples of {called[0]} and of {names} at the same time, got none: {', '.join(times)}"
             + ("; if their headers are of two clocks, say time='recorded', in the shell --time recorded" * of_headers)
         )
     start = int(at[inside][0])
     seconds = (at[inside] - start) / SECOND
     values = [first.values[inside]]
-    values += [values_at(seconds, (stamps - start) / SECOND, stream, x) for stream, (stamps, x) in others]
-    merged = replace(first.at(inside), heads=_heads(streams), values=np.hstack(values))
+    for stream, (stamps, x) in others:
+        k = sum(part.shape[1] for part in values)
+        own = heads[k : k + len(stream.heads)]
+        complete = x[np.isfinite(x).all(axis=1)]
+        ends = np.array([0, len(complete)])
+        channels = find_channels(own, complete, ends, kinds_of(kinds, own), has_others=True) if len(complete) else ()
+        values.append(values_at(seconds, (stamps - start) / SECOND, x, own, channels))
+    merged = replace(first.at(inside), heads=heads, values=np.hstack(values))
     n_lost = int(len(at) - inside.sum())
-    lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
+    lost = f"{counted(n_lost, 'sample')} of {called[0]} before {names} begins or after it ends"
     return merged, [lost] if n_lost else []
 
 
-def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:
-    """Return samples at other times, linearly, and of rotations on the sphere."""
+def values_at(at: Array, times: Array, values: Array, heads: Sequence[str], channels: Channels) -> Array:
+    """Return samples at other times: linearly, angles without their wraps, rotations on the sphere, steps as they were.
+
+    Columns of no channel are taken for positions.
+    """
     result = np.column_stack([np.interp(at, times, column) for column in values.T])
-    for k in rotations_in(stream.heads):
-        result[:, k : k + 4] = interpolated(at, times, values[:, k : k + 4])
+    number = {head: k for k, head in enumerate(heads)}
+    for channel in channels:
+        k = [number[head] for head in channel.columns]
+        if channel.kind == "orientation":
+            result[:, k] = interpolated(at, times, values[:, k])  # on great circles, whatever the order
+        elif channel.kind == "discrete":
+            result[:, k] = values[np.searchsorted(times, at, side="right") - 1][:, k]
+        elif channel.kind == "angle":
+            angles, known = values[:, k[0]].copy(), np.isfinite(values[:, k[0]])
+            period, ends = period_of_channel(channel, angles[known]), np.array([0, np.count_nonzero(known)])
+            angles[known] = without_wraps(angles[known], ends, period)
+            result[:, k[0]] = np.interp(at, times, angles)
     return result
 
 

@@ -409,6 +409,10 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
                 expected = f"expected a number in {head!r}{marks_within(cell)}"
                 wrong = wrong or ("" if is_missing(cell) else f"{expected}, got {cell!r}")
         rows[k] = tuple(row)
+        if wrong and tuple(cell.strip() for cell in cells) == tuple(head.strip() for head in dialect.heads):
+            wrong = (
+                "expected numbers, got the heads again, as where tables were put one behind the other; remove that line"
+            )
         if wrong:
             faults[k] = wrong
     return rows, faults

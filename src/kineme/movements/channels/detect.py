@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, SpecificationError
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
-from kineme.movements.channels.coordinates import in_order, period_of, with_periods, wrap_period
+from kineme.movements.channels.coordinates import (
+    in_order,
+    period_by_unit,
+    period_of,
+    with_periods,
+    without_wraps,
+    wrap_period,
+)
+from kineme.movements.rotations import NORM_TOLERANCE, angle_between, exp
 from kineme.movements.tables.columns import DISCRETE_WORDS, column_numbers
 from kineme.movements.tables.layout import listed
 from kineme.movements.tables.time_stamps import words_of
@@ -53,6 +61,10 @@ OTHER_QUANTITIES = frozenset(
         "omega",
     }
 )  # fmt: skip
+#: Ends of the names of a place and, after it, of a rotation vector; the last are those of ``actual_TCP_pose_0``.
+_POSES = (("x", "y", "z", "rx", "ry", "rz"), ("tx", "ty", "tz", "rx", "ry", "rz"), tuple("012345"))
+#: What the names of rotation vectors say, and their ends.
+_TURNS, _ENDS = ("axisangle", "rotvec", "rotationvector"), ("xyz", "012", "123")
 _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
 #: Drivers of motors call a position so, ``wrist_roll.pos``, in degrees, radians or percent of the range alike.
 _OF_MOTOR, _PERCENT, _TURN = "pos", 100.0, 2.0 * np.pi
@@ -71,13 +83,19 @@ _UNIT_WORD = re.compile(rf"[\W_]*(?<![a-z])({'|'.join(_UNIT_WORDS)})(?![a-z])", 
 
 
 def find_channels(
-    heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given, units: Sequence[str] = ()
+    heads: Sequence[str],
+    columns: Array,
+    offsets: NDArray[np.intp],
+    given: Given,
+    units: Sequence[str] = (),
+    has_others: bool = False,
 ) -> Channels:
     """The channels of movements that have the same columns.
 
     The columns of a quaternion need not be side by side in the file; those of a channel are, see `in_order`. What
     several heads in `given` begin with before a dot stands for all of them. `units` of the columns, empty where the
-    file does not say, are by default those in the heads.
+    file does not say, are by default those in the heads. Columns that are all discrete are what moves, unless the
+    movements have others beside them.
     """
     kinds, orientations = _given(heads, given)
     taken = {*kinds, *(k for orientation in orientations for k in orientation.columns)}
@@ -86,6 +104,8 @@ def find_channels(
     first = {min(orientation.columns): orientation for orientation in orientations}
     inside = {k for orientation in orientations for k in orientation.columns}
     numbered = find_numbered_joints(heads, [k for k in range(len(heads)) if k not in inside], columns)
+    vectors = [three for three in rotation_vectors(heads) if not inside & {*three}]
+    straight = {k for three in vectors if _turns_as_one(heads, three, columns, offsets, units) for k in three}
     channels: list[Channel] = []
     for k, head in enumerate(heads):
         if k in first:
@@ -94,9 +114,10 @@ def find_channels(
             channels.append(Channel(name, "orientation", tuple(heads[i] for i in four), None, order))
         elif k not in inside:
             unit = (units[k] if units else "") or unit_of(head)
-            kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets, k in numbered)
+            kind = "position" if k in straight else _kind(head, unit, columns[:, k], offsets, k in numbered)
+            kind = kinds.get(k, kind)
             channels.append(Channel(head, kind, (head,), unit))
-    if all(channel.kind == "discrete" for channel in channels):  # then they are what moves
+    if not has_others and all(channel.kind == "discrete" for channel in channels):
         return tuple(channel if k in kinds else channel._replace(kind="position") for k, channel in enumerate(channels))
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
@@ -165,6 +186,12 @@ def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Qua
     return kinds, orientations
 
 
+def kinds_of(given: Given, columns: Sequence[str]) -> dict[str, str]:
+    """Return the given kinds that are of these columns."""
+    named = {key: {key} if key in columns else {name.strip() for name in key.split(",")} for key in given}
+    return {key: given[key] for key, names in named.items() if names <= {*columns}}
+
+
 def _columns_named(heads: Sequence[str], key: str) -> list[int]:
     """The columns that a key names: a head, several separated by commas, or what several begin with before a dot."""
     if key in heads:
@@ -189,6 +216,44 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
     if is_joint or named or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"
+
+
+def rotation_vectors(heads: Sequence[str]) -> list[tuple[int, ...]]:
+    """Return the columns that are rotation vectors by their names: ``rotvec_x``, or ``rx`` beside a place ``x``."""
+    stems: dict[tuple[str, ...], dict[str, int]] = {}
+    for k, head in enumerate(heads):
+        *stem, end = words_of(name_of(head)) or ("",)
+        stems.setdefault(tuple(stem), {})[end] = k
+    found = []
+    for words, ends in stems.items():
+        poses = [pose for pose in _POSES if {*pose} <= {*ends} and (pose[0] != "0" or "pose" in words)]
+        if _says_vector(words) and "".join(sorted(ends)) in _ENDS:
+            poses.append(tuple(sorted(ends)))
+        if not {*words} & {"joint", *OTHER_QUANTITIES}:
+            found += [tuple(ends[end] for end in pose[-3:]) for pose in poses]
+    return found
+
+
+def _says_vector(words: Sequence[str]) -> bool:
+    return "".join(words).endswith(_TURNS)
+
+
+def _turns_as_one(
+    heads: Sequence[str], three: tuple[int, ...], columns: Array, offsets: NDArray[np.intp], units: Sequence[str]
+) -> bool:
+    """Tell whether columns that are named as a rotation vector are none of three angles by their values.
+
+    Longer than half a turn ``rx``, ``ry``, ``rz`` are angles of Euler. Each angle loses its wraps by itself: where that
+    changes a rotation vector, but not the rotation, as about one axis alone, it may well be taken for angles.
+    """
+    unit = (units[three[0]] if units else "") or unit_of(heads[three[0]])
+    period = period_by_unit(unit or "rad")
+    vectors = columns[:, three] * (_TURN / (period or np.nan))
+    longest = np.linalg.norm(vectors, axis=1).max(initial=0.0)
+    if not longest <= (np.inf if _says_vector(words_of(heads[three[0]])[:-1]) else (1.0 + NORM_TOLERANCE) * np.pi):
+        return False
+    apart = np.column_stack([without_wraps(x, offsets, _TURN) for x in vectors.T])
+    return bool((apart == vectors).all()) or bool(angle_between(exp(apart), exp(vectors)).max() > NORM_TOLERANCE)
 
 
 def _may_be_percent(values: Array) -> bool:
