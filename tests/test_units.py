@@ -114,6 +114,7 @@ def test_times_and_lengths_are_converted_without_rounding_but_of_the_result():
         ("x [mm]", ("x", "mm")),
         ("elbow (deg) ", ("elbow", "deg")),
         ("joint[0]", ("joint[0]", None)),
+        ("Left (X)", ("Left (X)", None)),
         ("q[1] [deg]", ("q[1]", "deg")),
         ("x", ("x", None)),
         ("x []", ("x", None)),

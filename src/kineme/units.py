@@ -109,10 +109,10 @@ def is_unit_of(text: str | None, quantity: str) -> bool:
 def split_head(head: str) -> tuple[str, str | None]:
     """Split the head of a column from the text in brackets that it ends in: ``x [mm]`` into ``x`` and ``mm``.
 
-    The number of ``joint[0]`` is part of the name.
+    The number of ``joint[0]`` and the axis of ``hand (X)`` are part of the name.
     """
     match = _BRACKETS.search(head)
-    if match is None or match[1].strip().isdecimal():
+    if match is None or match[1].strip().isdecimal() or match[1].strip().lower() in {*"xyz"}:
         return head, None
     return head[: match.start()].rstrip(), match[1].strip() or None
 

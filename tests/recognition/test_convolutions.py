@@ -266,7 +266,7 @@ def test_signals_are_known_by_profiles_and_values_too(n_dims):
         described = recognizer.describe(demos)
         features = transform(series_of(described), classifier.kernels) - classifier.center
         profiles = features / np.linalg.norm(features, axis=1, keepdims=True)
-        rows = (described.values - v.center) / v.spread * np.append(np.full(8, 8**-0.5), 1.0)
+        rows = (described.values - v.scale.center) / v.scale.spread * np.append(np.full(8, 8**-0.5), 1.0)
         squares = ((rows.reshape(len(demos), 1, -1) - v.rows) ** 2).sum(axis=2)
         shares = 0.75 * np.exp(recognizer.log_similarity(demos))
         shares += 0.25 * np.exp((profiles @ classifier.profiles.T - 1) / classifier.width**2)
@@ -446,9 +446,9 @@ def test_a_column_that_is_rounding_tells_nothing():
         )
 
     recognizer = kineme.Recognizer().fit(beside(shown, 1))
-    assert np.isinf(recognizer.classifier_.nearest.values.spread[-1])
+    assert np.isinf(recognizer.classifier_.nearest.values.scale.spread[-1])
     units = [np.column_stack((demo.positions, demo.positions[:, :2] * [1e2, 1e-9] + [1e5, 0])) for demo in shown]
-    assert np.isfinite(kineme.Recognizer().fit(units, shown.labels).classifier_.nearest.values.spread).all()
+    assert np.isfinite(kineme.Recognizer().fit(units, shown.labels).classifier_.nearest.values.scale.spread).all()
     one, other = beside(asked, 2), beside(asked, 3)
     np.testing.assert_allclose(recognizer.predict_proba(one), recognizer.predict_proba(other), atol=1e-4)
     np.testing.assert_allclose(recognizer.novelty(one), recognizer.novelty(other), rtol=1e-4)

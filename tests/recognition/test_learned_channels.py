@@ -14,9 +14,12 @@ import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel
+from kineme.movements.channels.coordinates import mean_turn
 from kineme.movements.trajectories.movements import of_channels
 from kineme.orientation import PoseDMP, exp, product
+from kineme.recognition.classifiers import squares_beside_kernels
 from kineme.recognition.early.live_state import LiveStatus
+from kineme.similarity.describe import describe
 
 XYZ = tuple(Channel(axis, "position", (axis,)) for axis in "xyz")
 Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")
@@ -287,3 +290,30 @@ def test_a_spinning_joint_is_not_taken_for_a_wrapping_one_when_it_is_averaged(of
     live._recognize = asked.append
     live.finish()
     np.testing.assert_array_equal(of_angles.comparison_.checked(asked).positions, before)
+
+
+FOUR = tuple(Channel(f"joint{k}", "angle", (f"joint{k}",), period=2 * np.pi) for k in range(1, 5))
+
+
+def resting(seed, n, wrapped):
+    """Four joints, two of which rest near half a turn; the level of the last one tells the class."""
+    random, u = np.random.default_rng(seed), np.linspace(0, 1, 40)[:, None]
+    paths = []
+    for i in range(n):
+        places = np.array([np.pi, -np.pi, 1.0, 0.5 + 0.8 * (i % 2)]) + 0.05 * random.normal(size=4)
+        path = places + np.sin(3 * u) * [0.5, -0.4, 0.6, 0.3] + 0.1 * np.sin(6 * u) * random.normal(size=4)
+        paths.append((path + np.pi) % (2 * np.pi) - np.pi if wrapped else path)
+    return of_joints(paths, ["ab"[i % 2] for i in range(n)], FOUR)
+
+
+def test_joints_near_half_a_turn_are_recognized_as_in_one_turn():
+    """Each recording is unwrapped from its own start: their values lie a whole turn apart, or do not."""
+    (shown, asked), there = ([resting(seed, 8, wrapped) for seed in (0, 1)] for wrapped in (True, False))
+    assert np.ptp(shown.positions[shown.offsets[:-1], 0]) > 6
+    for translation in (True, False):
+        here, expected = (Recognizer(translation=translation).fit(demos) for demos in (shown, there[0]))
+        np.testing.assert_allclose(here.decision_function(asked), expected.decision_function(there[1]), atol=1e-4)
+    everywhere = np.array([[-2.5], [0.0], [2.5]])
+    assert np.isinf(mean_turn(everywhere, np.array([2 * np.pi]))[1])
+    values = [squares_beside_kernels(describe(demos))[1][1] for demos in (shown, there[0])]
+    np.testing.assert_allclose(*values, atol=1e-9)

@@ -136,6 +136,18 @@ def test_names_of_columns_tell_the_points():
     assert point_names(channels(*sensors)) == ()
     assert point_names(channels(*HANDS[:4], HANDS[5], HANDS[4])) == ()
     assert point_names(channels(*[f"joint{k}" for k in range(6)])) == ()
+    for heads, names in (
+        ("Left (X),Left (Y),Right (X),Right (Y)", ("left", "right")),
+        ("x,y,z,x_2,y_2,z_2", ("xyz", "2")),
+        ("lx,ly,lz,rx,ry,rz", ("l", "r")),
+        ("left_hand_px,left_hand_py,right_hand_px,right_hand_py", ("left_hand", "right_hand")),
+        ("x1_px,y1_px,x2_px,y2_px", ("1_px", "2_px")),
+        ("x,y,z,rx,ry,rz", ()),
+        ("x,y,z,rot_x,rot_y,rot_z", ()),
+        ("ax,ay,az,gx,gy,gz", ()),
+        ("left_px,left_py,left_pz,left_vx,left_vy,left_vz", ()),
+    ):
+        assert point_names(channels(*heads.split(","))) == names
 
 
 def test_names_that_say_other_points_are_warned_of(tmp_path):

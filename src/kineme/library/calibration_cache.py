@@ -28,7 +28,7 @@ from kineme.validation import Array
 FILE = "calibration.cache"  # of a large library, by a sample
 FILE_OF_ALL = "calibration_of_all.cache"  # of a smaller one, whose members are all compared
 
-_FORMAT = "5"
+_FORMAT = "6"
 _FEW = 500  # members of which a calibration takes 0.1 s: computed every time
 _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`

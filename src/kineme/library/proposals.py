@@ -22,7 +22,7 @@ from kineme.recognition.answer import KnownClasses, open_set_labels
 from kineme.recognition.classifiers import MOST
 from kineme.reporting.text import counted
 from kineme.sampling import evenly_spaced
-from kineme.similarity.describe import Described, recorded_values, values_count
+from kineme.similarity.describe import Described, recorded_values, values_count, with_recorded
 from kineme.similarity.similarity import similarities
 from kineme.similarity.specification import ComparisonSpecification
 
@@ -119,7 +119,8 @@ def _with_values(store: Store, ids: Ids, features: Described, how: ComparisonSpe
     if not values_count(features, how):
         return features
     tiles = (read.movements(store, ids[start : start + _TILE]) for start in range(0, len(ids), _TILE))
-    return replace(features, values=np.concatenate([recorded_values(tile, 0, len(tile)) for tile in tiles]))
+    values = np.concatenate([recorded_values(tile, 0, len(tile)) for tile in tiles])
+    return with_recorded(features, values, store.channels)
 
 
 @dataclass(frozen=True, eq=False)

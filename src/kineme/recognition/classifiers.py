@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.movements.channels.coordinates import mean_turn, turns_beyond
 from kineme.recognition.conformal import (
     DIMENSIONS,
     EXPONENT,
@@ -88,11 +89,37 @@ class NearestEach(Classifier):
         return Nearest().best(compared) if one_each else super().best(compared)
 
 
+class ValueScale(NamedTuple):
+    """How `recorded_values` of references are centered and scaled; angles lie in the turn around their mean start."""
+
+    near: Array  # (d,), where columns of references start
+    periods: Array  # (d,), infinite where recorded values stay
+    center: Array  # (d, 9), means
+    spread: Array  # (d, 1), standard deviation in all references; infinite of a column that never changes
+
+    @classmethod
+    def of(cls, values: Array, periods: Array | None) -> ValueScale:
+        """Return that of values (n, d, 9) whose columns wrap by these periods (d,)."""
+        near, periods = mean_turn(values[:, :, 0], np.full(values.shape[1], np.inf) if periods is None else periods)
+        return cls(near, periods, *_center_and_spread(_in_turn(values, near, periods)))
+
+    def rows(self, values: Array) -> Array:
+        """Return rows (n, 9 d) of values (n, d, 9), whose squared distances are means over time, and of deviations."""
+        weights = np.append(np.full(N_MEANS, N_MEANS**-0.5), 1.0)
+        away = _in_turn(values, self.near, self.periods) - self.center
+        return np.asarray((away / self.spread * weights).reshape(len(values), -1))
+
+
+def _in_turn(values: Array, near: Array, periods: Array) -> Array:
+    """Return values (n, d, 9) less whole turns: each recording is unwrapped from its own first sample."""
+    turns = turns_beyond(values[:, :, 0], near, periods, most=0.5)
+    return np.concatenate((values[:, :, :N_MEANS] - turns[:, :, None], values[:, :, N_MEANS:]), axis=2)
+
+
 class Values(NamedTuple):
     """Rows of `recorded_values` of the references in units of each column's spread, and their share of the score."""
 
-    center: Array  # (d, 9), their means
-    spread: Array  # (d, 1), standard deviation in all references; infinite of a column that never changes
+    scale: ValueScale
     rows: Array  # (m, 9 d)
     width: float
     share: float = VALUED[0]
@@ -140,7 +167,7 @@ class NearestProfiled(NearestEach):
         if by is not self:
             own, values = self.values, compared.described.values
             profiles = _profiles(transform(series_of(compared.described), self.kernels), self.center)
-            rows = None if own is None or values is None else _standard(values, own.center, own.spread)
+            rows = None if own is None or values is None else own.scale.rows(values)
             others = self._logs(profiles, rows)
             vars(compared)["others"] = self, others
         return others
@@ -168,12 +195,6 @@ class NearestProfiled(NearestEach):
     def probabilities(self, scores: Array) -> Array:
         """Return the probability of each class, (n, C)."""
         return class_probabilities(scores, self.exponent)
-
-
-def _standard(values: Array, center: Array, spread: Array) -> Array:
-    """Return rows (n, 9 d) of values (n, d, 9), whose squared distances are means over the time, and of deviations."""
-    weights = np.append(np.full(N_MEANS, N_MEANS**-0.5), 1.0)
-    return np.asarray(((values - center) / spread * weights).reshape(len(values), -1))
 
 
 def _log_kernel(squares: Array, width: float) -> Array:
@@ -346,12 +367,13 @@ def _width(squares: Array, references: References) -> float:
 
 def _values(references: References) -> Values | None:
     """Return the recorded values of the references; None where they tell classes no more apart than rounding does."""
-    if references.described.values is None:
+    values = references.described.values
+    if values is None:
         return None
-    center, spread = _center_and_spread(references.described.values)
-    rows = _standard(references.described.values, center, spread)
+    scale = ValueScale.of(values, references.described.periods)
+    rows = scale.rows(values)
     width = _width(_squares(rows, rows), references)
-    return Values(center, spread, rows, width) if _SAME < width < np.inf else None
+    return Values(scale, rows, width) if _SAME < width < np.inf else None
 
 
 def _center_and_spread(values: Array) -> tuple[Array, Array]:
@@ -371,7 +393,7 @@ def squares_beside_kernels(described: Described) -> tuple[Array, Array]:
         return np.empty(0), np.empty((0, len(described), len(described)))
     features = convolve(described)[1]
     profiles = _profiles(features, features.mean(axis=0))
-    values = _standard(described.values, *_center_and_spread(described.values))
+    values = ValueScale.of(described.values, described.periods).rows(described.values)
     squares = np.stack([_squares(rows, rows) for rows in (profiles, values)])
     return np.array([PROFILED, VALUED[0]]), np.where(squares > _COPIES, squares, 0.0)
 

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.dmp.discrete.encode import check_movement
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.coordinates import with_periods
+from kineme.movements.channels.coordinates import mean_turn, turns_beyond, with_periods
 from kineme.movements.preparation.resample import extents_of
 from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -39,6 +40,7 @@ class Comparison:
 
     - `representations`: those with a weight above 0, and positions over arc length if pairs are rotated by them.
     - `channels`: what was recorded of the movements that it was fitted to; None if that is not known.
+    - `turn`: where position counts, where the columns of these movements begin (d,), and what they wrap by (d,).
     """
 
     representations: tuple[Representation, ...]
@@ -46,6 +48,7 @@ class Comparison:
     cutoff: float | None  # movements are smoothed below this many cycles each; None for not at all
     similarity: AveragedSimilarity  # with the distance, the widths, the weights and the average
     channels: Channels | None = None
+    turn: tuple[Array, Array] | None = None
 
     @property
     def procrustes(self) -> Procrustes:
@@ -78,13 +81,19 @@ class Comparison:
         )
 
     def checked(self, movements: MovementsLike, what: str = "movements") -> Demonstrations:
-        """Return the movements as `Demonstrations`, in the coordinates that were learned; see `as_learned`.
+        """Return the movements as `Demonstrations`, in the coordinates that were learned, and in their turn.
+
+        See `as_learned`.
 
         `what` they are called in messages.
 
         Raises `TrajectoryError`: movements of another number of dimensions, or of channels of other kinds.
         """
-        return as_learned(movements, self.channels, self.n_dims, what)
+        return _in_turn(as_learned(movements, self.channels, self.n_dims, what), self.turn)
+
+    def turned(self, starts: Array) -> Array:
+        """Return starts (n, d) in the turn of the movements that it was fitted to, where position counts."""
+        return starts if self.turn is None else starts - turns_beyond(starts, *self.turn, most=0.5)
 
     def describe(self, movements: Demonstrations) -> Described:
         """Return movements in the coordinates that were learned, described as the references are."""
@@ -123,13 +132,28 @@ def fit_comparison(
     demos = Demonstrations.of_movements(replace(in_coordinates(demos.movements), labels=labels), demos.steps)
     check_movement(demos, demos.positions[demos.offsets[:-1]], extents_of(demos, 0, len(demos)))
     specification = specification.with_points(demos.channels)
+    channels = None if demos.channels is None else with_periods(demos.channels, demos.recorded)
+    turn = None
+    if demos.channels is not None and not specification.normalization.translation:
+        starts = demos.positions[demos.offsets[:-1]]
+        turn = mean_turn(starts, RecordedAs(demos.channels).periods(starts))
+        demos = _in_turn(demos, turn)
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
     with single_threaded_blas():  # products of few rows: a second thread mostly waits
         described = describe_as(demos, specification, specification.procrustes(demos.n_dims))
         references = References.of(demos, described, labels)
-        channels = None if demos.channels is None else with_periods(demos.channels, demos.recorded)
-        return fit_to_references(specification, references, weights, channels)
+        comparison, references = fit_to_references(specification, references, weights, channels)
+        return replace(comparison, turn=turn), references
+
+
+def _in_turn(demos: Demonstrations, turn: tuple[Array, Array] | None) -> Demonstrations:
+    """Return movements less whole turns: each is unwrapped from its own first sample."""
+    turns = 0.0 if turn is None else turns_beyond(demos.positions[demos.offsets[:-1]], *turn, most=0.5)
+    if not np.any(turns):
+        return demos
+    positions = demos.positions - np.repeat(turns, demos.lengths, axis=0)
+    return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)
 
 
 def fit_to_references(

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from kineme.dmp.discrete.dmp import Primitives
+from kineme.dmp.recorded_as import RecordedAs
 from kineme.dmp.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.errors import TrajectoryError
 from kineme.kernels.pair_distances import Shapes, pair_distances, shapes_of
 from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.movements.channels.channel import Channels
 from kineme.movements.preparation.glitches import without_glitches
 from kineme.movements.preparation.pauses import uninterrupted
 from kineme.movements.preparation.resample import relative_rows
@@ -76,7 +78,15 @@ def with_values(
     described: Described, demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
 ) -> Described:
     """Add the values of movements start:stop where they count."""
-    return replace(described, values=recorded_values(demos, start, stop)) if values_count(described, how) else described
+    if not values_count(described, how):
+        return described
+    return with_recorded(described, recorded_values(demos, start, stop), demos.channels)
+
+
+def with_recorded(described: Described, values: Array, channels: Channels | None) -> Described:
+    """Add `recorded_values`, and what their columns wrap by."""
+    periods = None if channels is None else RecordedAs(channels).periods(values[:, :, 0])
+    return replace(described, values=values, periods=periods)
 
 
 def values_count(described: Described, how: ComparisonSpecification) -> bool:
@@ -328,6 +338,7 @@ class Described:
     pairs: Pairs | None = None  # for the representations after those, which are compared pair by pair
     own_weights: tuple[float, ...] | None = None  # the weights of the representations themselves; equal if None
     values: Array | None = None  # (n, d, 9), see `recorded_values`, where these count and movements were at hand
+    periods: Array | None = None  # (d,), what the columns of values wrap by, infinite of no angle; None if unknown
 
     def __len__(self) -> int:
         return len((self.blocks[0] if self.pairs is None else self.pairs.positions).rows)

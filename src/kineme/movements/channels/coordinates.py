@@ -24,6 +24,7 @@ _UNEVEN = 0.01  # of a period: by so much an angle that turns evenly steps diffe
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
 
 _NEAR = 0.125  # of a period: joints with limits are at places farther apart than this in one turn
+_CLEAR = 0.375  # of a period: what begins within this of a mean direction is as far as 1/8 from where turns begin
 
 _LEVER = 0.2
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
@@ -211,12 +212,12 @@ def _steps(values: Array, offsets: NDArray[np.intp]) -> Array:
     return steps
 
 
-def turns_beyond(points: Array, near: Array, periods: Array) -> Array:
-    """Return whole turns (n, d) by which points are beyond `near` (d,); 0 where they lie farther than 1/8 from it."""
+def turns_beyond(points: Array, near: Array, periods: Array, most: float = _NEAR) -> Array:
+    """Return whole turns (n, d) by which points are beyond `near` (d,); 0 where they are farther away than `most`."""
     away = points - near
     with np.errstate(invalid="ignore"):  # infinite periods
         turns = np.where(np.isfinite(periods), periods * np.round(away / periods), 0.0)
-    return np.where(np.abs(away - turns) <= _NEAR * periods, turns, 0.0)
+    return np.where(np.abs(away - turns) <= most * periods, turns, 0.0)
 
 
 def in_one_turn(starts: Array, periods: Array) -> Array:
@@ -224,8 +225,17 @@ def in_one_turn(starts: Array, periods: Array) -> Array:
 
     0 in columns in which some start is farther from it than an eighth of a turn.
     """
-    with np.errstate(invalid="ignore"):
+    mean, periods = mean_turn(starts, periods, _NEAR)
+    return turns_beyond(starts, mean, periods)
+
+
+def mean_turn(starts: Array, periods: Array, most: float = _CLEAR) -> tuple[Array, Array]:
+    """Return mean directions (d,) of starts (n, d), in the turn of their median, and the periods (d,).
+
+    These are infinite in columns in which some start is farther from the mean direction than `most` of a turn.
+    """
+    with np.errstate(invalid="ignore"):  # infinite periods
         mean = np.angle(np.exp(2j * np.pi * starts / periods).sum(axis=0)) * periods / (2.0 * np.pi)
         mean += periods * np.round((np.median(starts, axis=0) - mean) / periods)
-        turns = turns_beyond(starts, mean, periods)
-        return np.where((np.abs(starts - turns - mean) > _NEAR * periods).any(axis=0), 0.0, turns)
+        away = np.abs(starts - turns_beyond(starts, mean, periods, most) - mean)
+        return mean, np.where((away > most * periods).any(axis=0), np.inf, periods)

@@ -363,16 +363,17 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 
 #: Columns with one of them are no places, though they have three axes.
 _NO_PLACES = OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
+_SIDES = ({"l", "r"}, {"left", "right"})  # lx beside rx; without it rx is a rotation
 
 
 def point_names(channels: Channels | None) -> tuple[str, ...]:
     """Return names of the points whose x, y, z or x, y the columns are, one after the other; none of anything else."""
-    return _points_in_turn([_name_and_axis(channel) for channel in channels or ()])
+    return _points_in_turn(_names_and_axes(channels or ()))
 
 
 def points_apart(channels: Channels | None) -> tuple[str, ...]:
     """Return names of columns in which the points that they name come one after the other, where they do not."""
-    of_columns = [_name_and_axis(channel) for channel in channels or ()]
+    of_columns = _names_and_axes(channels or ())
     stems = [stem for stem, _ in of_columns]
     order = sorted(range(len(stems)), key=lambda k: (stems.index(stems[k]), of_columns[k][1]))
     if order == sorted(order) or not _points_in_turn([of_columns[k] for k in order]):
@@ -387,16 +388,29 @@ def _points_in_turn(of_columns: Sequence[tuple[str, str]]) -> tuple[str, ...]:
             continue
         points = [of_columns[k : k + d] for k in range(0, n, d)]
         stems = [point[0][0] for point in points]
+        if "" in stems and not all(stem.isdecimal() for stem in stems if stem):  # x, y, z only beside x2, y2, z2
+            continue
         if len({*stems}) == len(stems) and all(
             [axis for _, axis in point] == [*axes] and len({stem for stem, _ in point}) == 1 for point in points
         ):
-            return tuple(stems)
+            return tuple(stem or axes for stem in stems)
     return ()
 
 
-def _name_and_axis(channel: Channel) -> tuple[str, str]:
-    """Return what a column belongs to, and which coordinate it is; empty where that is not told."""
-    words = words_of(name_of(channel.name))
-    if channel.kind != "position" or len(words) < 2 or {*words} & _NO_PLACES:
-        return "", ""
-    return ("_".join(words[:-1]), words[-1]) if words[-1] in {*"xyz"} else ("_".join(words[1:]), words[0])
+def _names_and_axes(channels: Channels) -> list[tuple[str, str]]:
+    """Return what each column belongs to, and which coordinate it is; empty where that is not told."""
+    of_columns = [words_of(name_of(channel.name)) for channel in channels]
+    if {"_".join(words)[:-1] for words in of_columns} in _SIDES:
+        of_columns = [(words[0][:-1], words[0][-1]) for words in of_columns]
+    return [
+        _name_and_axis(words) if channel.kind == "position" and not {*words} & _NO_PLACES else ("", "")
+        for channel, words in zip(channels, of_columns, strict=True)
+    ]
+
+
+def _name_and_axis(words: tuple[str, ...]) -> tuple[str, str]:
+    if {*words[-1:]} & {"x", "y", "z"}:
+        return "_".join(words[:-1]), words[-1]
+    if {*words[:1]} & {"x", "y", "z"}:
+        return "_".join(words[1:]), words[0]
+    return ("_".join(words[:-1]), words[-1][1]) if {*words[-1:]} & {"px", "py", "pz"} else ("", "")  # p: position

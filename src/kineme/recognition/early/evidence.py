@@ -62,7 +62,7 @@ def describe_begun(
     `ComparisonSpecification.detailed_cutoff`.
     """
     prefixes = beginnings(paths, _WHOLE, over_time=stored.are_signals)
-    shift = 0.0 if stored.comparison.normalization.translation else starts[:, :, None]
+    shift = 0.0 if stored.comparison.normalization.translation else stored.comparison.turned(starts)[:, :, None]
     described = describe_prefixes(prefixes, stored.procrustes, signals=stored.are_signals)
     return Begun(prefixes, described, wholes[0] + shift, wholes[1] + shift, durations)
 
