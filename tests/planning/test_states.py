@@ -150,7 +150,7 @@ def test_a_library_without_symbols_has_no_states(tmp_path):
 
 def test_the_last_row_that_knows_a_column_is_the_state_now(shown):
     state = read_state(shown / "now.csv")
-    assert (state["hand_x"], state["hand_z"]) == tea.PLACES["home"]
+    assert (state["hand_x [m]"], state["hand_z"]) == tea.PLACES["home"]
     assert read_state({"door": "open", "cup_x": 0.5, "lid": ""}) == {"door": "open", "cup_x": 0.5}
 
 

@@ -21,7 +21,7 @@ from kineme.planning.problem import Problem, facts_after, problem_of, unmet
 from kineme.planning.skill import nearest_demonstration, outside, skill_of
 from kineme.planning.states import HAND, State, read_state
 from kineme.planning.under_way import Frame, Options, Part, Watcher, frame_of, monitored
-from kineme.planning.vocabulary import Fact, Variable, hand_of, position_of
+from kineme.planning.vocabulary import Fact, Variable, hand_of, position_of, state_in
 from kineme.reporting.table import Table
 from kineme.reporting.text import first_names
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -336,7 +336,8 @@ class _Executor:
 
     def sensed(self) -> dict[str, Any]:
         """Return the state now, positions in the frame of the plan."""
-        vocabulary, state = self.plan.problem.domain.vocabulary, read_state(self.world.state())
+        vocabulary = self.plan.problem.domain.vocabulary
+        state = state_in(vocabulary, read_state(self.world.state()))
         origin = dict(zip(vocabulary.axes, self.options.frame.origin[self.options.frame.axes].tolist(), strict=True))
         places = [HAND, *vocabulary.items, *vocabulary.fixtures]
         columns = {f"{name}_{axis}": origin[axis] for name in places for axis in vocabulary.axes}

@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -21,7 +21,7 @@ from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
 from kineme.planning.skill import is_gripper, place_columns
 from kineme.reporting.text import counted, first_names, text_in
-from kineme.units import split_head, unit_named
+from kineme.units import converted, split_head, unit_named
 from kineme.validation import Array
 
 HAND = "hand"
@@ -45,6 +45,7 @@ class States:
     - `axes`: k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are
       where the hand is.
     - `before`, `after` (n, c): NaN is not known; a word is its number in `words` of its column.
+    - `units`: of the columns of which the recordings or the table say one, as ``mm``.
     """
 
     movements: NDArray[np.int64]
@@ -54,6 +55,7 @@ class States:
     before: Array
     after: Array
     words: Mapping[str, tuple[str, ...]]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.movements)
@@ -63,7 +65,8 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     """Return the states before and after each movement of a symbol.
 
     Where the hand is, and discrete channels as of a gripper, come from the recordings. The table adds what else is
-    known: positions of objects (``cup_x, cup_y, cup_z``, in the frame and unit of the recordings), flags and words.
+    known: positions of objects (``cup_x, cup_y, cup_z``, in the frame of the recordings, and in their unit or in one
+    that the head says), flags and words.
 
     It is a file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, or a mapping of
     column to n values, as a data frame; with a row for each moment. Either it has the columns ``movement`` (id, or
@@ -82,6 +85,7 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     places, names, units = place_columns(library.channels, primitives.n_dims)
     axes = _axes(names)
     columns = [f"{HAND}_{axis}" for axis in axes]
+    said = dict(zip(columns, units, strict=True))
     before, after = primitives.starts[:, places], primitives.goals[:, places]
     discrete = [
         channel.columns[0] for channel in library.channels or ()
@@ -97,31 +101,50 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
             for moment, row in ((before, 0), (after, -1))
         )
         columns += map(_column, discrete)
+        unit_in = {channel.columns[0]: channel.unit for channel in library.channels or ()}
+        said |= {_column(column): unit_in[column] for column in discrete}
+    unit_of = {column: unit.symbol for column, text in said.items() if (unit := unit_named(text or ""))}
     words: dict[str, tuple[str, ...]] = {}
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
-        unit_of = dict(zip(axes, units, strict=True))
-        for head in cells:
-            unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
-            if unit is not None and other is not None and unit != other:
-                raise DataError(
-                    f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
-                )
+        heads, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
+        for k, head in enumerate(heads):
+            column = _column(head)
+            own = (axis for axis in axes if column.endswith(f"_{axis}"))
+            like = f"{HAND}_{axis}" if (axis := max(own, key=len, default="")) else column
+            if unit := unit_named(unit_of.get(like) or split_head(head)[1] or ""):
+                unit_of[like] = unit_of[column] = unit.symbol
+            for values in (extra_before, extra_after) if column not in words else ():
+                values[:, k] = in_unit(values[:, k], head, unit_of.get(column))
+        more = [*map(_column, heads)]
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
-    return States(ids, symbols, axes, tuple(columns), before, after, words)
+    return States(ids, symbols, axes, tuple(columns), before, after, words, unit_of)
 
 
 def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    """Return one state: the last row of a table that knows each column, or a mapping of column to value."""
+    """Return one state: the last row of a table that knows each column, or a mapping of column to value.
+
+    A column whose head says a unit keeps it, ``cup_x [mm]``; `problem_of` converts it to that of the domain.
+    """
     cells = _texts(_read(Path(source))) if isinstance(source, str | Path) else {k: [str(v)] for k, v in source.items()}
     state: dict[str, Any] = {}
     for head, texts in cells.items():
         values = [value for value in map(_value, texts) if value is not None]
         if values and not is_time(head):
-            state[_column(head)] = values[-1]
+            unit = unit_named(split_head(head)[1] or "")
+            state[f"{_column(head)} [{unit.symbol}]" if unit else _column(head)] = values[-1]
     return state
+
+
+def in_unit(values: Any, head: str, wanted: str | None) -> Any:
+    """Return numbers in a wanted unit, from that which their head says; as they are where either says none."""
+    here, there = unit_named(split_head(head)[1] or ""), unit_named(wanted or "")
+    if here is None or there is None or here == there:
+        return values
+    if here.quantity != there.quantity:
+        raise DataError(f"expected {head} in [{there.symbol}], as it was recorded, or in another {there.quantity}")
+    return converted(values, here, there)
 
 
 def _tables(path: Path) -> dict[str, list[str]]:
@@ -203,7 +226,7 @@ def _column(head: str) -> str:
 def _matched(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
 ) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
-    """Return columns, states before and after (n, c), and words, of the rows that belong to each movement."""
+    """Return heads, states before and after (n, c), and words, of the rows that belong to each movement."""
     lower = {head.lower(): head for head in cells}
     who = next((lower[name] for name in _MOVEMENTS if name in lower), None)
     moment = next((lower[name] for name in _MOMENTS if name in lower), None)
@@ -231,7 +254,7 @@ def _matched(
             f"{first_names([record['name'] or str(record['id']) for record in read.records(library.store, ids)], 5)}"
         )
     padded = np.vstack((values, np.full(len(heads), np.nan)))  # row -1: nothing is known
-    return [_column(head) for head in heads], padded[before], padded[after], words
+    return heads, padded[before], padded[after], words
 
 
 def _rows_by_moment(

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -25,8 +25,9 @@ import numpy as np
 
 from kineme.errors import SpecificationError
 from kineme.planning.skill import is_gripper
-from kineme.planning.states import HAND, State, States
+from kineme.planning.states import HAND, State, States, in_unit
 from kineme.reporting.text import first_names
+from kineme.units import split_head
 from kineme.validation import Array
 
 Fact = tuple[str, ...]  # a predicate and its arguments
@@ -63,6 +64,7 @@ class Vocabulary:
     radius: float  # in the unit of the recordings: what lies within it is at a place
     closed_above: bool | None  # whether the gripper is closed above its threshold; None where no movement tells
     left_out: Mapping[str, str]  # columns that say nothing here -> why
+    units: Mapping[str, str] = field(default_factory=dict)  # of columns, as far as they were said
 
     def of_kind(self, *kinds: str) -> list[Variable]:
         """Return the variables of some kinds, in order."""
@@ -77,6 +79,12 @@ class Vocabulary:
     def fixtures(self) -> list[str]:
         """Names of the fixtures."""
         return [variable.name for variable in self.of_kind("fixture")]
+
+    @property
+    def positions(self) -> list[str]:
+        """Columns of positions: of the hand and of objects."""
+        hand = [f"{HAND}_{axis}" for axis in self.axes]
+        return hand + [column for variable in self.of_kind("item", "fixture") for column in variable.columns]
 
     @property
     def tells_grasp(self) -> bool:
@@ -125,8 +133,8 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
         else:
             variables.append(variable)
     variables = _told_apart(variables)
-    vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out)
-    return Vocabulary(states.axes, tuple(variables), near, _closed_above(states, vocabulary), left_out)
+    vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out, states.units)
+    return replace(vocabulary, closed_above=_closed_above(states, vocabulary))
 
 
 def kind_of(name: str) -> str:
@@ -227,6 +235,26 @@ def _closed_above(states: States, vocabulary: Vocabulary) -> bool | None:
         carried |= goes_along & (np.linalg.norm(moved, axis=1) > vocabulary.radius)
     votes = [int((carried & steady & (levels[0] == level)).sum()) for level in (False, True)]
     return None if votes[0] == votes[1] else votes[1] > votes[0]
+
+
+def state_in(vocabulary: Vocabulary, state: State) -> dict[str, Any]:
+    """Return a state with its numbers in the units of a vocabulary, those of heads with others converted."""
+    columns = {head: split_head(head)[0] for head in state}
+    return {
+        column: value if isinstance(value, str | None) else in_unit(value, head, vocabulary.units.get(column))
+        for (head, column), value in zip(columns.items(), state.values(), strict=True)
+    }
+
+
+def unit_notes(vocabulary: Vocabulary, state: State) -> list[str]:
+    """Say of which positions of a state the units are not told apart from those of a vocabulary, for want of one."""
+    heads = {split_head(head): vocabulary.units.get(split_head(head)[0]) for head in state}
+    bare = {unit for (name, own), unit in heads.items() if name in vocabulary.positions and unit and own is None}
+    others = {own for (name, own), unit in heads.items() if name in vocabulary.positions and own and unit is None}
+    return [
+        *(f"positions whose heads say no unit are taken in {unit}, that of the recordings" for unit in sorted(bare)),
+        *(f"positions in {unit} are taken as they are: the domain says no unit of them" for unit in sorted(others)),
+    ]
 
 
 def position_of(names: Sequence[str], state: State) -> Array:
