@@ -286,5 +286,7 @@ def test_a_recording_without_a_table_takes_none_of_a_similar_name(tmp_path):
     with _library(tmp_path, "x,y,z") as library:
         table = {"time": [0, 2, 0, 2], "file": ["go1", "go1", "bac", "bac"], "lid": [0, 1, 0, 1]}
         states = states_of(library, table)
+        note = learn_operators(library, table).operator("go").cannot_tell[0]
     known = np.isfinite(states.before[:, states.columns.index("lid")])
     assert known.sum() == 1
+    assert note == "the states have no row before or after 2 of 3 movements"

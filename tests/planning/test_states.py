@@ -79,11 +79,14 @@ def test_both_kinds_of_tables_give_the_true_operators(shown, library, table):
     assert all(operator.symbol_id.startswith("sym-") for operator in domain.operators)
 
 
+@pytest.mark.parametrize(("head", "per_second"), [("time", 1), ("time [ms]", 1e3), ("t_us", 1e6), ("stamp_ns", 1e9)])
 @pytest.mark.parametrize(("shift", "counts"), [(0.04, True), (0.3, False)])
-def test_a_state_within_a_twentieth_of_an_end_is_at_it(library, shift, counts):
+def test_a_state_within_a_twentieth_of_an_end_is_at_it(library, shift, counts, head, per_second):
     """Cuts are not exact: of 2 s, a twentieth is 0.1 s."""
-    table = {"time": [-1.0, shift, 2.0 - shift, 2.5], "lid": [0, 1, 0, 1], "file": ["monday-000"] * 4}
+    times = [per_second * t for t in (-1.0, shift, 2.0 - shift, 2.5)]
+    table = {head: times, "lid": [0, 1, 0, 1], "file": ["monday-000"] * 4}
     states = states_of(library, table)
+    assert states.missing == {*states.movements[1:].tolist()}
     k = states.columns.index("lid")
     assert (states.before[0, k], states.after[0, k]) == ((1.0, 0.0) if counts else (0.0, 1.0))
 

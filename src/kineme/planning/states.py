@@ -19,6 +19,7 @@ from kineme.io.limits import check_expanded, read_limited
 from kineme.library.library import ActionLibrary
 from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.time_stamps import in_seconds, unit_in_head
 from kineme.planning.skill import is_gripper, place_columns
 from kineme.reporting.text import counted, first_names, text_in
 from kineme.units import converted, split_head, unit_named
@@ -46,6 +47,7 @@ class States:
       where the hand is.
     - `before`, `after` (n, c): NaN is not known; a word is its number in `words` of its column.
     - `units`: of the columns of which the recordings or the table say one, as ``mm``.
+    - `missing`: ids of movements before or after which the table has no row.
     """
 
     movements: NDArray[np.int64]
@@ -56,6 +58,7 @@ class States:
     after: Array
     words: Mapping[str, tuple[str, ...]]
     units: Mapping[str, str] = field(default_factory=dict)
+    missing: frozenset[int] = frozenset()
 
     def __len__(self) -> int:
         return len(self.movements)
@@ -105,9 +108,10 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
         said |= {_column(column): unit_in[column] for column in discrete}
     unit_of = {column: unit.symbol for column, text in said.items() if (unit := unit_named(text or ""))}
     words: dict[str, tuple[str, ...]] = {}
+    missing = np.zeros(len(ids), bool)
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        heads, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
+        heads, extra_before, extra_after, words, missing = _matched(library, ids, _texts(cells), source)
         for k, head in enumerate(heads):
             column = _column(head)
             own = (axis for axis in axes if column.endswith(f"_{axis}"))
@@ -119,7 +123,7 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
         more = [*map(_column, heads)]
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
-    return States(ids, symbols, axes, tuple(columns), before, after, words, unit_of)
+    return States(ids, symbols, axes, tuple(columns), before, after, words, unit_of, frozenset(ids[missing].tolist()))
 
 
 def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
@@ -225,8 +229,8 @@ def _column(head: str) -> str:
 
 def _matched(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
-) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
-    """Return heads, states before and after (n, c), and words, of the rows that belong to each movement."""
+) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]], NDArray[np.bool_]]:
+    """Return heads, states before and after (n, c) by the rows of each movement, words, and which lack a row (n,)."""
     lower = {head.lower(): head for head in cells}
     who = next((lower[name] for name in _MOVEMENTS if name in lower), None)
     moment = next((lower[name] for name in _MOMENTS if name in lower), None)
@@ -254,7 +258,7 @@ def _matched(
             f"{first_names([record['name'] or str(record['id']) for record in read.records(library.store, ids)], 5)}"
         )
     padded = np.vstack((values, np.full(len(heads), np.nan)))  # row -1: nothing is known
-    return heads, padded[before], padded[after], words
+    return heads, padded[before], padded[after], words, (before < 0) | (after < 0)
 
 
 def _rows_by_moment(
@@ -282,7 +286,7 @@ def _rows_by_time(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], heads: tuple[Any, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     who, _, time = heads
-    clock = np.array([_number(text, time) for text in cells[time]])
+    clock = _seconds(cells[time], time)
     rows_of: dict[PurePath, list[int]] = {}
     for row, text in enumerate(cells[who] if who else [""] * len(clock)):
         rows_of.setdefault(PurePath(text.removesuffix(PurePath(text).suffix)), []).append(row)
@@ -319,11 +323,12 @@ def _rows_by_time(
     return before, after
 
 
-def _number(text: str, head: str) -> float:
-    value = _value(text)
-    if not isinstance(value, float):
-        raise DataError(f"expected numbers [s] in the column {head}, got {text!r}")
-    return value
+def _seconds(texts: Sequence[str], head: str) -> Array:
+    """Return times [s] in the unit that their head ends in, as of recordings, by default seconds."""
+    values, unit = list(map(_value, texts)), unit_in_head(head) or "s"
+    if (wrong := next((k for k, value in enumerate(values) if not isinstance(value, float)), None)) is not None:
+        raise DataError(f"expected numbers [{unit}] in the column {head}, got {texts[wrong]!r}")
+    return in_seconds(np.array(values, dtype=np.float64), unit)
 
 
 def _merged(
