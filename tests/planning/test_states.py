@@ -151,10 +151,13 @@ def test_a_library_without_symbols_has_no_states(tmp_path):
         states_of(library)
 
 
-def test_the_last_row_that_knows_a_column_is_the_state_now(shown):
+def test_the_latest_row_alone_is_the_state_now(shown, tmp_path):
     state = read_state(shown / "now.csv")
     assert (state["hand_x [m]"], state["hand_z"]) == tea.PLACES["home"]
     assert read_state({"door": "open", "cup_x": 0.5, "lid": ""}) == {"door": "open", "cup_x": 0.5}
+    for heads, rows in (("time_ms,cup_x,lid", ("0,1,0", "60,,1", "40,3,0")), ("cup_x,lid", ("1,0", ",1"))):
+        (tmp_path / "now.csv").write_text("\n".join([heads, *rows]))
+        assert read_state(tmp_path / "now.csv") == {"lid": 1.0}
 
 
 def test_a_skill_moves_to_a_new_goal_and_says_what_lies_outside(library):

@@ -127,17 +127,20 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
 
 
 def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    """Return one state: the last row of a table that knows each column, or a mapping of column to value.
+    """Return one state: the latest row of a table, without times the last one, or a mapping of column to value.
 
-    A column whose head says a unit keeps it, ``cup_x [mm]``; `problem_of` converts it to that of the domain.
+    Empty cells are not known, whatever earlier rows say. A column whose head says a unit keeps it, ``cup_x [mm]``;
+    `problem_of` converts it to that of the domain.
     """
     cells = _texts(_read(Path(source))) if isinstance(source, str | Path) else {k: [str(v)] for k, v in source.items()}
+    time, row = next(filter(is_time, cells), None), -1
+    if time is not None and len(cells[time]) > 1:
+        row = int(np.argsort(_seconds(cells[time], time), kind="stable")[-1])
     state: dict[str, Any] = {}
     for head, texts in cells.items():
-        values = [value for value in map(_value, texts) if value is not None]
-        if values and not is_time(head):
-            unit = unit_named(split_head(head)[1] or "")
-            state[f"{_column(head)} [{unit.symbol}]" if unit else _column(head)] = values[-1]
+        value, unit = _value(texts[row]), unit_named(split_head(head)[1] or "")
+        if value is not None and not is_time(head):
+            state[f"{_column(head)} [{unit.symbol}]" if unit else _column(head)] = value
     return state
 
 
