@@ -199,7 +199,8 @@ def _follow(folder: Any, steps: Any, plot: Path | None) -> list[int | None]:
     from kineme.reporting.figures import save_figure
 
     with opts.opened(folder) as library:
-        skills = {step.operator: skill_of(library, step.operator) for step in steps.steps}
+        operators = {step.operator: steps.problem.domain.operator(step.operator) for step in steps.steps}
+        skills = {name: skill_of(library, operator.symbol) for name, operator in operators.items()}
         follows = [
             int(skills[step.operator].movements[nearest_demonstration(skills[step.operator], step.start, step.goal)])
             if step.start

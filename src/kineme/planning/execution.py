@@ -198,7 +198,7 @@ def execute(  # noqa: PLR0913 - one parameter per option
     check_number("look_rate", look_rate, least=0.0)
     check_count("most_replans", most_replans, 0)
     frame = frame_of(plan, origin)
-    watcher = watcher or monitored(library, robot, frame)
+    watcher = watcher or monitored(plan, library, robot, frame)
     options = Options(
         replan, watcher, done or (lambda step: None), leeway, follow, frame, join and look_rate > 0, look_rate
     )
@@ -243,7 +243,7 @@ def _movement(
     operator = domain.operator(step.operator)
     if reasons := is_shown(domain, operator, step.arguments, problem.places):
         raise SpecificationError(f"{step} is outside what was shown: {'; '.join(reasons)}")
-    skill = skill_of(library, operator.symbol_id or step.operator)
+    skill = skill_of(library, operator.symbol)
     if {*skill.units} - {None, "m"}:
         raise SpecificationError(f"expected movements in meters, {skill.name} is in {', '.join(map(str, skill.units))}")
     ends = hands_of(operator, step.arguments, problem.places)
