@@ -30,6 +30,7 @@ from kineme.planning import (
     read_plan,
     read_state,
     simulation_of,
+    skill_of,
     under_way,
 )
 from kineme.planning.execution import frame_of, monitored
@@ -360,6 +361,18 @@ def test_steps_are_checked_without_a_world(table):
     assert "--origin" in far.reasons[0]
     assert not any(option in far.reasons[0] for option in ("--at", "--scale", "--rest"))
     assert check_steps(plan, library, load("so101")).attempts[-1].status == "refused"
+
+
+@pytest.mark.parametrize(("unit", "status"), [("meters", "checked"), (None, "checked"), ("mm", "refused")])
+def test_movements_are_in_meters_however_these_are_spelled(plane, monkeypatch, unit, status):
+    domain = learn_operators(plane)
+    high = next(name for name, where in domain.places.items() if where[0] > 0.5)
+    plan = shortest(problem_of(domain, {"hand_x": 0.4, "hand_z": 0.3}, f"(hand-at {high})"))
+    in_unit = replace(skill_of(plane, "up"), units=(unit, unit))
+    monkeypatch.setattr("kineme.planning.execution.skill_of", lambda *_: in_unit)
+    [attempt] = check_steps(plan, plane, load("panda"), origin=(0.0, 0.1, 0.0)).attempts
+    assert attempt.status == status
+    assert (unit == "mm") == ("expected movements in meters" in "".join(attempt.reasons))
 
 
 def test_the_world_of_a_plan_is_as_the_plan_has_it(table):

@@ -31,6 +31,7 @@ from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.simulation import Run
+from kineme.units import UNITS, unit_named
 from kineme.validation import Array, check_count, check_number
 
 FORMAT, VERSION = "kineme-execution", 1
@@ -244,7 +245,7 @@ def _movement(
     if reasons := is_shown(domain, operator, step.arguments, problem.places):
         raise SpecificationError(f"{step} is outside what was shown: {'; '.join(reasons)}")
     skill = skill_of(library, operator.symbol)
-    if {*skill.units} - {None, "m"}:
+    if any(unit is not None and unit_named(unit) != UNITS["m"] for unit in skill.units):
         raise SpecificationError(f"expected movements in meters, {skill.name} is in {', '.join(map(str, skill.units))}")
     ends = hands_of(operator, step.arguments, problem.places)
     frame, follow = how
