@@ -14,7 +14,7 @@ import kineme
 from kineme import ActionLibrary
 from kineme.cli import main
 from kineme.errors import DataError, SpecificationError
-from kineme.planning import learn_operators, move_to, outside, read_state, skill_of, states_of
+from kineme.planning import learn_operators, move_to, outside, problem_of, read_state, skill_of, states_of
 
 _CLOCK = 3.0  # seconds from the start of one movement to the next
 
@@ -158,6 +158,27 @@ def test_the_latest_row_alone_is_the_state_now(shown, tmp_path):
     for heads, rows in (("time_ms,cup_x,lid", ("0,1,0", "60,,1", "40,3,0")), ("cup_x,lid", ("1,0", ",1"))):
         (tmp_path / "now.csv").write_text("\n".join([heads, *rows]))
         assert read_state(tmp_path / "now.csv") == {"lid": 1.0}
+
+
+def test_decimal_commas_and_heads_in_capitals_are_read(shown, library, tmp_path):
+    heads, *rows = (shown / "clock.csv").read_text().splitlines()
+    lines = [row.replace("monday.csv", "monday").replace(",", ";").replace(".", ",") for row in rows]
+    (tmp_path / "states.csv").write_text("\n".join([heads.replace(",", ";"), *lines]))
+    expected = states_of(library, shown / "clock.csv")
+    np.testing.assert_array_equal(states_of(library, tmp_path / "states.csv").before, expected.before)
+    domain, now = tea.domain(), tea.now()
+    (tmp_path / "now.csv").write_text(f"{';'.join(now).upper()}\n{';'.join(map(str, now.values()))}".replace(".", ","))
+    problems = [problem_of(domain, each, "(sweet cup)") for each in (now, read_state(tmp_path / "now.csv"))]
+    assert problems[0].facts == problems[1].facts
+    for wrong, message in (("0,6", "numbers with a decimal point"), ("shelf", "numbers in the position cup_x")):
+        with pytest.raises(DataError, match=message):
+            problem_of(domain, now | {"cup_x": wrong}, "(sweet cup)")
+        (tmp_path / "states.csv").write_text("\n".join([heads, rows[0].replace(rows[0].split(",")[4], f'"{wrong}"')]))
+        with pytest.raises(DataError, match="in the position"):
+            states_of(library, tmp_path / "states.csv")
+    (tmp_path / "now.csv").write_text("cup_x;cup_z\n0,6;0.1")
+    with pytest.raises(DataError, match="one decimal mark"):
+        read_state(tmp_path / "now.csv")
 
 
 def test_a_skill_moves_to_a_new_goal_and_says_what_lies_outside(library):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.limits import check_expanded, read_limited
+from kineme.io.tables.dialect import COMMA_NUMBER, as_float, is_number, marks_within
 from kineme.library.library import ActionLibrary
 from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
@@ -111,13 +112,17 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     missing = np.zeros(len(ids), bool)
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        heads, extra_before, extra_after, words, missing = _matched(library, ids, _texts(cells), source)
+        heads, extra_before, extra_after, words, missing = _matched(library, ids, texts := _texts(cells), source)
         for k, head in enumerate(heads):
             column = _column(head)
             own = (axis for axis in axes if column.endswith(f"_{axis}"))
             like = f"{HAND}_{axis}" if (axis := max(own, key=len, default="")) else column
             if unit := unit_named(unit_of.get(like) or split_head(head)[1] or ""):
                 unit_of[like] = unit_of[column] = unit.symbol
+            stem = column.removesuffix(f"_{axis}")
+            if axis and column in words and {f"{stem}_{each}" for each in axes} <= {*columns, *map(_column, heads)}:
+                for value in map(value_of, texts[head]):
+                    check_number_in(head, value)
             for values in (extra_before, extra_after) if column not in words else ():
                 values[:, k] = in_unit(values[:, k], head, unit_of.get(column))
         more = [*map(_column, heads)]
@@ -138,7 +143,7 @@ def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
         row = int(np.argsort(_seconds(cells[time], time), kind="stable")[-1])
     state: dict[str, Any] = {}
     for head, texts in cells.items():
-        value, unit = _value(texts[row]), unit_named(split_head(head)[1] or "")
+        value, unit = value_of(texts[row]), unit_named(split_head(head)[1] or "")
         if value is not None and not is_time(head):
             state[f"{_column(head)} [{unit.symbol}]" if unit else _column(head)] = value
     return state
@@ -182,17 +187,25 @@ def _read(path: Path) -> dict[str, list[str]]:
         check_expanded(_CELL * len(data), "a table of states")
         text = data.decode("utf-8-sig")
         first = next((line for line in text.splitlines() if line.strip()), "")
+        separator = max("\t;,", key=first.count)
         rows = [
-            row for row in csv.reader(io.StringIO(text, newline=""), delimiter=max("\t;,", key=first.count)) if any(row)
+            [text_in(cell.strip()) for cell in row]
+            for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+            if any(row)
         ]
     except (ValueError, csv.Error) as error:
         raise DataError(f"expected a table of states in CSV, {path}: {error}") from error
-    heads = [text_in(cell.strip()) for cell in rows[0]] if rows else []
+    heads = rows[0] if rows else []
     if len(rows) < 2 or len({*heads}) < len(heads) or "" in heads:
         raise DataError(f"expected a table of states with a name above each column and rows below, {path} is none")
     if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != len(heads)), None):
         raise DataError(f"expected {len(heads)} cells in each row of {path}, row {wrong} has {len(rows[wrong - 1])}")
-    return {head: [text_in(row[k].strip()) for row in rows[1:]] for k, head in enumerate(heads)}
+    cells = [cell for row in rows[1:] for cell in row]
+    commas = [cell for cell in cells if separator != "," and COMMA_NUMBER.fullmatch(cell)]
+    if commas and (point := next((cell for cell in cells if "." in cell and is_number(cell, comma=False)), "")):
+        raise DataError(f"expected one decimal mark in {path}, got {commas[0]!r} and {point!r}; write all alike")
+    decimal = {cell: cell.replace(",", ".") for cell in commas}
+    return {head: [decimal.get(row[k], row[k]) for row in rows[1:]] for k, head in enumerate(heads)}
 
 
 def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
@@ -204,15 +217,21 @@ def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
     }
 
 
-def _value(text: str) -> float | str | None:
+def value_of(text: str) -> float | str | None:
     """Return a cell as a number or a word; None where it says nothing."""
     if text.lower() in _MISSING:
         return None
-    try:
-        number = float(text)
-    except ValueError:
+    if not is_number(text, comma=False):
         return text
+    number = as_float(text)
     return number if math.isfinite(number) else None
+
+
+def check_number_in(head: str, value: float | str | None) -> float | None:
+    """Refuse a word as a coordinate of a position."""
+    if isinstance(value, str):
+        raise DataError(f"expected numbers{marks_within(value)} in the position {head}, got {value!r}")
+    return value
 
 
 def _axes(names: Sequence[str]) -> tuple[str, ...]:
@@ -247,7 +266,7 @@ def _matched(
     words: dict[str, tuple[str, ...]] = {}
     values = np.full((len(next(iter(cells.values()))), len(heads)), np.nan)
     for k, head in enumerate(heads):
-        column = [_value(text) for text in cells[head]]
+        column = [value_of(text) for text in cells[head]]
         if any(isinstance(value, str) for value in column):
             column = [value if value is None or isinstance(value, str) else f"{value:g}" for value in column]
             words[_column(head)] = tuple(sorted({str(value) for value in column if value is not None}))
@@ -328,7 +347,7 @@ def _rows_by_time(
 
 def _seconds(texts: Sequence[str], head: str) -> Array:
     """Return times [s] in the unit that their head ends in, as of recordings, by default seconds."""
-    values, unit = list(map(_value, texts)), unit_in_head(head) or "s"
+    values, unit = list(map(value_of, texts)), unit_in_head(head) or "s"
     if (wrong := next((k for k, value in enumerate(values) if not isinstance(value, float)), None)) is not None:
         raise DataError(f"expected numbers [{unit}] in the column {head}, got {texts[wrong]!r}")
     return in_seconds(np.array(values, dtype=np.float64), unit)

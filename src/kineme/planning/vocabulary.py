@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.errors import SpecificationError
+from kineme.errors import DataError, SpecificationError
 from kineme.planning.skill import is_gripper
-from kineme.planning.states import HAND, State, States, in_unit
+from kineme.planning.states import HAND, State, States, check_number_in, in_unit, value_of
 from kineme.reporting.text import first_names
 from kineme.units import split_head
 from kineme.validation import Array
@@ -238,19 +238,37 @@ def _closed_above(states: States, vocabulary: Vocabulary) -> bool | None:
 
 
 def state_in(vocabulary: Vocabulary, state: State) -> dict[str, Any]:
-    """Return a state with its numbers in the units of a vocabulary, those of heads with others converted."""
-    columns = {head: split_head(head)[0] for head in state}
-    return {
-        column: value if isinstance(value, str | None) else in_unit(value, head, vocabulary.units.get(column))
-        for (head, column), value in zip(columns.items(), state.values(), strict=True)
+    """Return a state in the columns of a vocabulary and in their units; refuse words where a position is expected."""
+    result: dict[str, Any] = {}
+    for head, column in _meant(vocabulary, state).items():
+        if column in result:
+            raise DataError(f"expected one column {column} in the state, got several, the last is {head}")
+        value = state[head]
+        if column in vocabulary.positions and isinstance(value, str):
+            value = check_number_in(head, value_of(value))
+        is_text = isinstance(value, str | None)
+        result[column] = value if is_text else in_unit(value, head, vocabulary.units.get(column))
+    return result
+
+
+def _meant(vocabulary: Vocabulary, state: State) -> dict[str, str]:
+    """Return head of a state -> column, which is one of the vocabulary in any case if one alone is meant."""
+    plain = {head: split_head(head)[0] for head in state}
+    known = [*vocabulary.positions, *(each.columns[0] for each in vocabulary.of_kind(*_TELLING)), *vocabulary.left_out]
+    lower = [column.lower() for column in known]
+    free = {
+        name: column
+        for name, column in zip(lower, known, strict=True)
+        if lower.count(name) == 1 and column not in plain.values()
     }
+    return {head: free.get(column.lower(), column) for head, column in plain.items()}
 
 
 def unit_notes(vocabulary: Vocabulary, state: State) -> list[str]:
     """Say of which positions of a state the units are not told apart from those of a vocabulary, for want of one."""
-    heads = {split_head(head): vocabulary.units.get(split_head(head)[0]) for head in state}
-    bare = {unit for (name, own), unit in heads.items() if name in vocabulary.positions and unit and own is None}
-    others = {own for (name, own), unit in heads.items() if name in vocabulary.positions and own and unit is None}
+    positions = {head: column for head, column in _meant(vocabulary, state).items() if column in vocabulary.positions}
+    units = {(split_head(head)[1] or "", vocabulary.units.get(column, "")) for head, column in positions.items()}
+    bare, others = {unit for own, unit in units if not own} - {""}, {own for own, unit in units if not unit} - {""}
     return [
         *(f"positions whose heads say no unit are taken in {unit}, that of the recordings" for unit in sorted(bare)),
         *(f"positions in {unit} are taken as they are: the domain says no unit of them" for unit in sorted(others)),
