@@ -30,15 +30,17 @@ from kineme.planning import (
     read_plan,
     read_state,
     simulation_of,
+    skill_of,
     under_way,
 )
 from kineme.planning.execution import frame_of, monitored
-from kineme.planning.figure import write_moving
+from kineme.planning.figure import paths_of_plan, write_moving
 from kineme.planning.plan import step_of
 from kineme.planning.problem import facts_after, shown_arguments, unmet
 from kineme.planning.simulated import assume_flags
 from kineme.robots import Simulation, load
 from kineme.robots.execution.preflight import preflight
+from kineme.robots.kinematics.descent import kinematics
 
 OBJECTS = {"cup": (0.45, -0.05, 0.2), "mug": (0.35, 0.15, 0.2), "tray": (0.5, 0.25, 0.25), "shelf": (0.45, -0.3, 0.4)}
 GOAL = "(and (in cup tray))"
@@ -98,7 +100,7 @@ def statuses(execution):
 
 def test_a_plan_reaches_its_goal_and_every_movement_keeps_the_limits(table):
     plan, world = begin(table, noise=0.0005)
-    execution = run(table, plan, world, watcher=monitored(table[0], table[2], frame_of(plan)), join=False)
+    execution = run(table, plan, world, watcher=monitored(plan, table[0], table[2], frame_of(plan)), join=False)
     assert execution.reached
     assert execution.why == ""
     assert statuses(execution) == [("planned", "done")] * 3
@@ -132,7 +134,9 @@ def test_the_monitor_of_a_symbol_stops_what_leaves_it(table):
     library, _, robot = table
     plan, world = begin(table)
     world.push((0.0, 30.0, 0.0), at=1.5)
-    execution = run(table, plan, world, leeway=1.0, watcher=monitored(library, robot, frame_of(plan)), most_replans=1)
+    execution = run(
+        table, plan, world, leeway=1.0, watcher=monitored(plan, library, robot, frame_of(plan)), most_replans=1
+    )
     assert execution.reached
     assert execution.attempts[0].status == "stopped"
     assert "outside what was shown" in execution.attempts[0].reasons[0]
@@ -251,7 +255,7 @@ def test_who_loses_an_object_on_the_way_stops(table):
 def test_steps_that_follow_each_other_are_one_movement(table):
     library, domain, robot = table
     plan, world = begin(table, noise=0.0005)
-    execution = run(table, plan, world, watcher=monitored(library, robot, frame_of(plan)))
+    execution = run(table, plan, world, watcher=monitored(plan, library, robot, frame_of(plan)))
     assert execution.reached
     assert apart(world) < 0.02
     assert statuses(execution) == [("planned", "done"), ("joined", "done")]
@@ -359,6 +363,18 @@ def test_steps_are_checked_without_a_world(table):
     assert check_steps(plan, library, load("so101")).attempts[-1].status == "refused"
 
 
+@pytest.mark.parametrize(("unit", "status"), [("meters", "checked"), (None, "checked"), ("mm", "refused")])
+def test_movements_are_in_meters_however_these_are_spelled(plane, monkeypatch, unit, status):
+    domain = learn_operators(plane)
+    high = next(name for name, where in domain.places.items() if where[0] > 0.5)
+    plan = shortest(problem_of(domain, {"hand_x": 0.4, "hand_z": 0.3}, f"(hand-at {high})"))
+    in_unit = replace(skill_of(plane, "up"), units=(unit, unit))
+    monkeypatch.setattr("kineme.planning.execution.skill_of", lambda *_: in_unit)
+    [attempt] = check_steps(plan, plane, load("panda"), origin=(0.0, 0.1, 0.0)).attempts
+    assert attempt.status == status
+    assert (unit == "mm") == ("expected movements in meters" in "".join(attempt.reasons))
+
+
 def test_the_world_of_a_plan_is_as_the_plan_has_it(table):
     plan, _ = begin(table)
     world = simulation_of(plan, table[2], noise=0.001, seed=3)
@@ -430,6 +446,23 @@ def test_a_plan_in_a_plane(plane):
     assert execution.reached
     np.testing.assert_allclose(execution.runs[0].tips[-1], (0.55, 0.1, 0.4), atol=0.01)
     np.testing.assert_allclose(execution.runs[0].tips[:, 1], 0.1, atol=2e-3)
+
+
+def test_symbols_that_swapped_their_names_are_drawn_and_watched_as_in_the_plan(plane, tmp_path):
+    domain, robot, origin = learn_operators(plane), load("panda"), (0.0, 0.1, 0.0)
+    high = next(name for name, where in domain.places.items() if where[0] > 0.5)
+    plan = shortest(problem_of(domain, {"hand_x": 0.4, "hand_z": 0.3}, f"(hand-at {high})"))
+    [(_, path)] = paths_of_plan(plan, plane)
+    with kineme.ActionLibrary(tmp_path / "actions") as library:
+        for old, new in (("up", "other"), ("along", "up"), ("other", "along")):
+            library.rename(old, new)
+        np.testing.assert_array_equal(paths_of_plan(plan, library)[0][1], path)
+        [movement] = check_steps(plan, library, robot, origin=origin).movements
+        frame = frame_of(plan, origin)
+        watch = monitored(plan, library, robot, frame)(plan.steps[0], movement)
+        tips = kinematics(robot, movement.trajectory.positions[movement.first :])[0]
+        times = movement.trajectory.times[movement.first :] - movement.begins
+        assert not any(watch(t, tip) for t, tip in zip(times, tips, strict=True))
 
 
 def test_joined_steps_do_not_stop_between_them(plane):

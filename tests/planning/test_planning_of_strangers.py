@@ -38,6 +38,7 @@ from kineme.planning.figure import paths_of_plan
 from kineme.planning.operators import operators_of
 from kineme.planning.problem import shown_arguments
 from kineme.planning.states import States
+from kineme.planning.vocabulary import unit_notes
 
 
 def _library(folder, heads, width=None):
@@ -76,16 +77,29 @@ def test_objects_are_found_whatever_the_recordings_call_the_hand(tmp_path, heads
         domain = learn_operators(library, _cup(library))
         assert domain.vocabulary.fixtures == ["cup"]
         assert domain.operator("go").parameters[1].kinds == ("cup",)
-        with pytest.raises(DataError, match="unit of the recordings") if "mm" in heads else _Nothing():
-            learn_operators(library, _cup(library, ("cup_x [m]", "cup_y [m]", "cup_z [m]")))
 
 
-class _Nothing:
-    def __enter__(self):
-        return None
-
-    def __exit__(self, *_):
-        return False
+@pytest.mark.parametrize("heads", ["x [mm],y [mm],z [mm]", "x,y,z"])
+def test_units_of_states_are_those_of_the_recordings(tmp_path, heads):
+    """What the recordings do not say, the table does; a domain that knows none takes the numbers as they are."""
+    bare, meters = (tuple(f"cup_{axis}{unit}" for axis in "xyz") for unit in ("", " [m]"))
+    with _library(tmp_path, heads) as library:
+        domain = learn_operators(library, _cup(library, meters))
+        where = np.array([0.5, 0.3, 0.1]) * (1000 if "mm" in heads else 1)
+        np.testing.assert_allclose(domain.vocabulary.variables[0].typical, where)
+        plain = learn_operators(library, _cup(library, bare))
+    domain = domain_from_dict(json.loads(json.dumps(domain_to_dict(domain))))
+    now = {f"{name}_{axis} [cm]": 40.0 for name in ("hand", "cup") for axis in "xyz"}
+    for each, place in ((domain, where[0] * 0.8), (plain, 400.0 if "mm" in heads else 40.0)):
+        problem = problem_of(each, now, "(hand-at cup)")
+        np.testing.assert_allclose(problem.places["cup"], [place] * 3)
+        assert unit_notes(each.vocabulary, now) == (
+            [] if each.vocabulary.units else ["positions in cm are taken as they are: the domain says no unit of them"]
+        )
+    with pytest.raises(DataError, match=r"expected cup_z \[kg\] in \[m"):
+        problem_of(domain, {"cup_z [kg]": 1.0}, "(hand-at cup)")
+    unit = "mm" if "mm" in heads else "m"
+    assert f"taken in {unit}," in unit_notes(domain.vocabulary, {"cup_x": 0.4})[0]
 
 
 def test_the_width_of_a_gripper_is_no_place_and_a_plan_is_drawn_beside_it(tmp_path):
@@ -272,5 +286,7 @@ def test_a_recording_without_a_table_takes_none_of_a_similar_name(tmp_path):
     with _library(tmp_path, "x,y,z") as library:
         table = {"time": [0, 2, 0, 2], "file": ["go1", "go1", "bac", "bac"], "lid": [0, 1, 0, 1]}
         states = states_of(library, table)
+        note = learn_operators(library, table).operator("go").cannot_tell[0]
     known = np.isfinite(states.before[:, states.columns.index("lid")])
     assert known.sum() == 1
+    assert note == "the states have no row before or after 2 of 3 movements"

@@ -14,7 +14,7 @@ import kineme
 from kineme import ActionLibrary
 from kineme.cli import main
 from kineme.errors import DataError, SpecificationError
-from kineme.planning import learn_operators, move_to, outside, read_state, skill_of, states_of
+from kineme.planning import learn_operators, move_to, outside, problem_of, read_state, skill_of, states_of
 
 _CLOCK = 3.0  # seconds from the start of one movement to the next
 
@@ -79,11 +79,14 @@ def test_both_kinds_of_tables_give_the_true_operators(shown, library, table):
     assert all(operator.symbol_id.startswith("sym-") for operator in domain.operators)
 
 
+@pytest.mark.parametrize(("head", "per_second"), [("time", 1), ("time [ms]", 1e3), ("t_us", 1e6), ("stamp_ns", 1e9)])
 @pytest.mark.parametrize(("shift", "counts"), [(0.04, True), (0.3, False)])
-def test_a_state_within_a_twentieth_of_an_end_is_at_it(library, shift, counts):
+def test_a_state_within_a_twentieth_of_an_end_is_at_it(library, shift, counts, head, per_second):
     """Cuts are not exact: of 2 s, a twentieth is 0.1 s."""
-    table = {"time": [-1.0, shift, 2.0 - shift, 2.5], "lid": [0, 1, 0, 1], "file": ["monday-000"] * 4}
+    times = [per_second * t for t in (-1.0, shift, 2.0 - shift, 2.5)]
+    table = {head: times, "lid": [0, 1, 0, 1], "file": ["monday-000"] * 4}
     states = states_of(library, table)
+    assert states.missing == {*states.movements[1:].tolist()}
     k = states.columns.index("lid")
     assert (states.before[0, k], states.after[0, k]) == ((1.0, 0.0) if counts else (0.0, 1.0))
 
@@ -148,10 +151,34 @@ def test_a_library_without_symbols_has_no_states(tmp_path):
         states_of(library)
 
 
-def test_the_last_row_that_knows_a_column_is_the_state_now(shown):
+def test_the_latest_row_alone_is_the_state_now(shown, tmp_path):
     state = read_state(shown / "now.csv")
-    assert (state["hand_x"], state["hand_z"]) == tea.PLACES["home"]
+    assert (state["hand_x [m]"], state["hand_z"]) == tea.PLACES["home"]
     assert read_state({"door": "open", "cup_x": 0.5, "lid": ""}) == {"door": "open", "cup_x": 0.5}
+    for heads, rows in (("time_ms,cup_x,lid", ("0,1,0", "60,,1", "40,3,0")), ("cup_x,lid", ("1,0", ",1"))):
+        (tmp_path / "now.csv").write_text("\n".join([heads, *rows]))
+        assert read_state(tmp_path / "now.csv") == {"lid": 1.0}
+
+
+def test_decimal_commas_and_heads_in_capitals_are_read(shown, library, tmp_path):
+    heads, *rows = (shown / "clock.csv").read_text().splitlines()
+    lines = [row.replace("monday.csv", "monday").replace(",", ";").replace(".", ",") for row in rows]
+    (tmp_path / "states.csv").write_text("\n".join([heads.replace(",", ";"), *lines]))
+    expected = states_of(library, shown / "clock.csv")
+    np.testing.assert_array_equal(states_of(library, tmp_path / "states.csv").before, expected.before)
+    domain, now = tea.domain(), tea.now()
+    (tmp_path / "now.csv").write_text(f"{';'.join(now).upper()}\n{';'.join(map(str, now.values()))}".replace(".", ","))
+    problems = [problem_of(domain, each, "(sweet cup)") for each in (now, read_state(tmp_path / "now.csv"))]
+    assert problems[0].facts == problems[1].facts
+    for wrong, message in (("0,6", "numbers with a decimal point"), ("shelf", "numbers in the position cup_x")):
+        with pytest.raises(DataError, match=message):
+            problem_of(domain, now | {"cup_x": wrong}, "(sweet cup)")
+        (tmp_path / "states.csv").write_text("\n".join([heads, rows[0].replace(rows[0].split(",")[4], f'"{wrong}"')]))
+        with pytest.raises(DataError, match="in the position"):
+            states_of(library, tmp_path / "states.csv")
+    (tmp_path / "now.csv").write_text("cup_x;cup_z\n0,6;0.1")
+    with pytest.raises(DataError, match="one decimal mark"):
+        read_state(tmp_path / "now.csv")
 
 
 def test_a_skill_moves_to_a_new_goal_and_says_what_lies_outside(library):

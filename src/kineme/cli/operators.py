@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from kineme.cli import options as opts
-from kineme.cli.output import check_new, say, table, to_json
+from kineme.cli.output import check_new, say, table, to_json, write
 from kineme.reporting.text import counted, first_names, printable
 
 _FORMATS = {".pddl": "pddl", ".json": "json", ".xml": "behavior-tree"}
@@ -154,6 +154,7 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
     from kineme.planning.plan import find_plan, plan_to_dict
     from kineme.planning.problem import problem_from_pddl, problem_of
     from kineme.planning.states import read_state
+    from kineme.planning.vocabulary import unit_notes
 
     if (problem is None) == (options["goal"] is None):
         raise click.UsageError("expected a problem in PDDL, or --goal, one of both")
@@ -163,6 +164,8 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
         check_new(path, options["force"], domain, *([problem] if problem else []))
     state = None if options["state"] is None else read_state(options["state"])
     known = opened_domain(domain)
+    for note in unit_notes(known.vocabulary, state or {}):
+        write(f"note: {printable(note)}", err=True)
     if problem is not None:
         task = problem_from_pddl(known, problem.read_text(encoding="utf-8"), state)
     elif state is None:
@@ -196,7 +199,8 @@ def _follow(folder: Any, steps: Any, plot: Path | None) -> list[int | None]:
     from kineme.reporting.figures import save_figure
 
     with opts.opened(folder) as library:
-        skills = {step.operator: skill_of(library, step.operator) for step in steps.steps}
+        operators = {step.operator: steps.problem.domain.operator(step.operator) for step in steps.steps}
+        skills = {name: skill_of(library, operator.symbol) for name, operator in operators.items()}
         follows = [
             int(skills[step.operator].movements[nearest_demonstration(skills[step.operator], step.start, step.goal)])
             if step.start

@@ -81,6 +81,11 @@ class Operator:
     movements: tuple[int, ...]
 
     @property
+    def symbol(self) -> str:
+        """What names its symbol in the library: the id, which outlives a new name, if there is one."""
+        return self.symbol_id or self.name
+
+    @property
     def places(self) -> list[Parameter]:
         """Parameters that are places."""
         return [parameter for parameter in self.parameters if parameter.type == "place"]

@@ -21,7 +21,7 @@ from kineme.planning.problem import Problem, facts_after, problem_of, unmet
 from kineme.planning.skill import nearest_demonstration, outside, skill_of
 from kineme.planning.states import HAND, State, read_state
 from kineme.planning.under_way import Frame, Options, Part, Watcher, frame_of, monitored
-from kineme.planning.vocabulary import Fact, Variable, hand_of, position_of
+from kineme.planning.vocabulary import Fact, Variable, hand_of, position_of, state_in
 from kineme.reporting.table import Table
 from kineme.reporting.text import first_names
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -31,6 +31,7 @@ from kineme.robots.planning.generate_at import generate_at
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.simulation import Run
+from kineme.units import UNITS, unit_named
 from kineme.validation import Array, check_count, check_number
 
 FORMAT, VERSION = "kineme-execution", 1
@@ -198,7 +199,7 @@ def execute(  # noqa: PLR0913 - one parameter per option
     check_number("look_rate", look_rate, least=0.0)
     check_count("most_replans", most_replans, 0)
     frame = frame_of(plan, origin)
-    watcher = watcher or monitored(library, robot, frame)
+    watcher = watcher or monitored(plan, library, robot, frame)
     options = Options(
         replan, watcher, done or (lambda step: None), leeway, follow, frame, join and look_rate > 0, look_rate
     )
@@ -243,8 +244,8 @@ def _movement(
     operator = domain.operator(step.operator)
     if reasons := is_shown(domain, operator, step.arguments, problem.places):
         raise SpecificationError(f"{step} is outside what was shown: {'; '.join(reasons)}")
-    skill = skill_of(library, operator.symbol_id or step.operator)
-    if {*skill.units} - {None, "m"}:
+    skill = skill_of(library, operator.symbol)
+    if any(unit is not None and unit_named(unit) != UNITS["m"] for unit in skill.units):
         raise SpecificationError(f"expected movements in meters, {skill.name} is in {', '.join(map(str, skill.units))}")
     ends = hands_of(operator, step.arguments, problem.places)
     frame, follow = how
@@ -336,7 +337,8 @@ class _Executor:
 
     def sensed(self) -> dict[str, Any]:
         """Return the state now, positions in the frame of the plan."""
-        vocabulary, state = self.plan.problem.domain.vocabulary, read_state(self.world.state())
+        vocabulary = self.plan.problem.domain.vocabulary
+        state = state_in(vocabulary, read_state(self.world.state()))
         origin = dict(zip(vocabulary.axes, self.options.frame.origin[self.options.frame.axes].tolist(), strict=True))
         places = [HAND, *vocabulary.items, *vocabulary.fixtures]
         columns = {f"{name}_{axis}": origin[axis] for name in places for axis in vocabulary.axes}

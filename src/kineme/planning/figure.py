@@ -36,7 +36,8 @@ _COLORS = (ORANGE, BLUE, GREEN, PURPLE, GRAY)
 
 def paths_of_plan(plan: Plan, library: ActionLibrary) -> list[tuple[str, Array]]:
     """Return the symbol and the path (T, k) of each step that moves the hand, each from where the last one ends."""
-    skills = {name: skill_of(library, name) for name in {step.operator for step in plan.steps}}
+    operators = {step.operator: plan.problem.domain.operator(step.operator) for step in plan.steps}
+    skills = {name: skill_of(library, operator.symbol) for name, operator in operators.items()}
     paths: list[tuple[str, Array]] = []
     for step in plan.steps:
         if step.start:

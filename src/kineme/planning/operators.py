@@ -23,6 +23,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -104,7 +105,12 @@ def operators_of(
     for name in dict.fromkeys(sorted(states.symbols)):
         rows = [row for row, symbol in enumerate(states.symbols) if symbol == name]
         duration = float(np.median(np.asarray(durations)[rows]))
-        operators.append(_operator(name, symbol_ids.get(name, ""), [examples[row] for row in rows], duration, rules))
+        own = [examples[row] for row in rows]
+        operator = _operator(name, symbol_ids.get(name, ""), own, duration, rules)
+        if n := sum(each.movement in states.missing for each in own):
+            note = f"the states have no row before or after {n} of {counted(len(own), 'movement')}"
+            operator = replace(operator, cannot_tell=(note, *operator.cannot_tell))
+        operators.append(operator)
     domain = Domain(vocabulary, tuple(operators), _visited(vocabulary, examples))
     return edited(domain, edits)
 

@@ -13,7 +13,7 @@ from kineme.errors import SpecificationError
 from kineme.planning.domain import Domain, Literal, Operator, is_shown
 from kineme.planning.pddl import Names, literals_of, name_of, parsed, read_problem
 from kineme.planning.states import State
-from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of
+from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of, state_in
 from kineme.validation import Array, as_point
 
 _MOST_GROUND = 200_000  # operators with arguments, at most
@@ -55,7 +55,8 @@ def problem_of(
 ) -> Problem:
     """Return a problem.
 
-    - `state`: the state now, in the columns of the states that the domain was learned from; numbers and words.
+    - `state`: the state now, in the columns of the states that the domain was learned from; numbers and words. A head
+      may say another unit, ``cup_x [mm]``; without one, the numbers are in that of these states.
     - `goal`: facts, or a conjunction of literals in PDDL, as ``(and (in cup shelf) (not (full cup)))``.
     - `places`: positions (k,) of more places, by name.
 
@@ -64,6 +65,7 @@ def problem_of(
     named = {name: np.array(where) for name, where in domain.places.items()}
     for name, where in (places or {}).items():
         named[name] = as_point(f"the place {name}", where, domain.vocabulary.axes)
+    state = state_in(domain.vocabulary, state)
     at = _places_now(domain, state, named)
     problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
     if isinstance(goal, str):
@@ -82,6 +84,7 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     objects, facts, goals = read_problem(text)
     named = {name: np.array(where) for name, where in domain.places.items()}
     at = named | {each.name: np.array(each.typical) for each in domain.vocabulary.of_kind("fixture") if each.typical}
+    state = None if state is None else state_in(domain.vocabulary, state)
     at = at if state is None else _places_now(domain, state, named)
     problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
     names = Names(domain, problem.objects)

@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, SpecificationError
 from kineme.io.limits import check_expanded, read_limited
+from kineme.io.tables.dialect import COMMA_NUMBER, as_float, is_number, marks_within
 from kineme.library.library import ActionLibrary
 from kineme.library.storage import read
 from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.time_stamps import in_seconds, unit_in_head
 from kineme.planning.skill import is_gripper, place_columns
 from kineme.reporting.text import counted, first_names, text_in
-from kineme.units import split_head, unit_named
+from kineme.units import converted, split_head, unit_named
 from kineme.validation import Array
 
 HAND = "hand"
@@ -45,6 +47,8 @@ class States:
     - `axes`: k coordinates of places, ``x`` where the recordings have ``tip_x [mm]``; the columns ``hand_x`` ... are
       where the hand is.
     - `before`, `after` (n, c): NaN is not known; a word is its number in `words` of its column.
+    - `units`: of the columns of which the recordings or the table say one, as ``mm``.
+    - `missing`: ids of movements before or after which the table has no row.
     """
 
     movements: NDArray[np.int64]
@@ -54,6 +58,8 @@ class States:
     before: Array
     after: Array
     words: Mapping[str, tuple[str, ...]]
+    units: Mapping[str, str] = field(default_factory=dict)
+    missing: frozenset[int] = frozenset()
 
     def __len__(self) -> int:
         return len(self.movements)
@@ -63,7 +69,8 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     """Return the states before and after each movement of a symbol.
 
     Where the hand is, and discrete channels as of a gripper, come from the recordings. The table adds what else is
-    known: positions of objects (``cup_x, cup_y, cup_z``, in the frame and unit of the recordings), flags and words.
+    known: positions of objects (``cup_x, cup_y, cup_z``, in the frame of the recordings, and in their unit or in one
+    that the head says), flags and words.
 
     It is a file in CSV, or a folder of such files, also in folders of it, as the recordings themselves, or a mapping of
     column to n values, as a data frame; with a row for each moment. Either it has the columns ``movement`` (id, or
@@ -82,6 +89,7 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
     places, names, units = place_columns(library.channels, primitives.n_dims)
     axes = _axes(names)
     columns = [f"{HAND}_{axis}" for axis in axes]
+    said = dict(zip(columns, units, strict=True))
     before, after = primitives.starts[:, places], primitives.goals[:, places]
     discrete = [
         channel.columns[0] for channel in library.channels or ()
@@ -97,31 +105,58 @@ def states_of(library: ActionLibrary, table: str | Path | Mapping[str, Sequence[
             for moment, row in ((before, 0), (after, -1))
         )
         columns += map(_column, discrete)
+        unit_in = {channel.columns[0]: channel.unit for channel in library.channels or ()}
+        said |= {_column(column): unit_in[column] for column in discrete}
+    unit_of = {column: unit.symbol for column, text in said.items() if (unit := unit_named(text or ""))}
     words: dict[str, tuple[str, ...]] = {}
+    missing = np.zeros(len(ids), bool)
     if table is not None:
         cells, source = (_tables(Path(table)), str(table)) if isinstance(table, str | Path) else (table, "the table")
-        more, extra_before, extra_after, words = _matched(library, ids, _texts(cells), source)
-        unit_of = dict(zip(axes, units, strict=True))
-        for head in cells:
-            unit, other = (unit_named(text or "") for text in (split_head(head)[1], unit_of.get(_column(head)[-1:])))
-            if unit is not None and other is not None and unit != other:
-                raise DataError(
-                    f"expected {head} in the unit of the recordings, [{other.symbol}], got [{unit.symbol}]; convert it"
-                )
+        heads, extra_before, extra_after, words, missing = _matched(library, ids, texts := _texts(cells), source)
+        for k, head in enumerate(heads):
+            column = _column(head)
+            own = (axis for axis in axes if column.endswith(f"_{axis}"))
+            like = f"{HAND}_{axis}" if (axis := max(own, key=len, default="")) else column
+            if unit := unit_named(unit_of.get(like) or split_head(head)[1] or ""):
+                unit_of[like] = unit_of[column] = unit.symbol
+            stem = column.removesuffix(f"_{axis}")
+            if axis and column in words and {f"{stem}_{each}" for each in axes} <= {*columns, *map(_column, heads)}:
+                for value in map(value_of, texts[head]):
+                    check_number_in(head, value)
+            for values in (extra_before, extra_after) if column not in words else ():
+                values[:, k] = in_unit(values[:, k], head, unit_of.get(column))
+        more = [*map(_column, heads)]
         columns, before, after = _merged(columns, more, (before, after), (extra_before, extra_after))
     symbols = tuple(name or "" for name in read.names_of(library.store, ids))
-    return States(ids, symbols, axes, tuple(columns), before, after, words)
+    return States(ids, symbols, axes, tuple(columns), before, after, words, unit_of, frozenset(ids[missing].tolist()))
 
 
 def read_state(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    """Return one state: the last row of a table that knows each column, or a mapping of column to value."""
+    """Return one state: the latest row of a table, without times the last one, or a mapping of column to value.
+
+    Empty cells are not known, whatever earlier rows say. A column whose head says a unit keeps it, ``cup_x [mm]``;
+    `problem_of` converts it to that of the domain.
+    """
     cells = _texts(_read(Path(source))) if isinstance(source, str | Path) else {k: [str(v)] for k, v in source.items()}
+    time, row = next(filter(is_time, cells), None), -1
+    if time is not None and len(cells[time]) > 1:
+        row = int(np.argsort(_seconds(cells[time], time), kind="stable")[-1])
     state: dict[str, Any] = {}
     for head, texts in cells.items():
-        values = [value for value in map(_value, texts) if value is not None]
-        if values and not is_time(head):
-            state[_column(head)] = values[-1]
+        value, unit = value_of(texts[row]), unit_named(split_head(head)[1] or "")
+        if value is not None and not is_time(head):
+            state[f"{_column(head)} [{unit.symbol}]" if unit else _column(head)] = value
     return state
+
+
+def in_unit(values: Any, head: str, wanted: str | None) -> Any:
+    """Return numbers in a wanted unit, from that which their head says; as they are where either says none."""
+    here, there = unit_named(split_head(head)[1] or ""), unit_named(wanted or "")
+    if here is None or there is None or here == there:
+        return values
+    if here.quantity != there.quantity:
+        raise DataError(f"expected {head} in [{there.symbol}], as it was recorded, or in another {there.quantity}")
+    return converted(values, here, there)
 
 
 def _tables(path: Path) -> dict[str, list[str]]:
@@ -152,17 +187,25 @@ def _read(path: Path) -> dict[str, list[str]]:
         check_expanded(_CELL * len(data), "a table of states")
         text = data.decode("utf-8-sig")
         first = next((line for line in text.splitlines() if line.strip()), "")
+        separator = max("\t;,", key=first.count)
         rows = [
-            row for row in csv.reader(io.StringIO(text, newline=""), delimiter=max("\t;,", key=first.count)) if any(row)
+            [text_in(cell.strip()) for cell in row]
+            for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+            if any(row)
         ]
     except (ValueError, csv.Error) as error:
         raise DataError(f"expected a table of states in CSV, {path}: {error}") from error
-    heads = [text_in(cell.strip()) for cell in rows[0]] if rows else []
+    heads = rows[0] if rows else []
     if len(rows) < 2 or len({*heads}) < len(heads) or "" in heads:
         raise DataError(f"expected a table of states with a name above each column and rows below, {path} is none")
     if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != len(heads)), None):
         raise DataError(f"expected {len(heads)} cells in each row of {path}, row {wrong} has {len(rows[wrong - 1])}")
-    return {head: [text_in(row[k].strip()) for row in rows[1:]] for k, head in enumerate(heads)}
+    cells = [cell for row in rows[1:] for cell in row]
+    commas = [cell for cell in cells if separator != "," and COMMA_NUMBER.fullmatch(cell)]
+    if commas and (point := next((cell for cell in cells if "." in cell and is_number(cell, comma=False)), "")):
+        raise DataError(f"expected one decimal mark in {path}, got {commas[0]!r} and {point!r}; write all alike")
+    decimal = {cell: cell.replace(",", ".") for cell in commas}
+    return {head: [decimal.get(row[k], row[k]) for row in rows[1:]] for k, head in enumerate(heads)}
 
 
 def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
@@ -174,15 +217,21 @@ def _texts(cells: Mapping[str, Sequence[Any]]) -> dict[str, list[str]]:
     }
 
 
-def _value(text: str) -> float | str | None:
+def value_of(text: str) -> float | str | None:
     """Return a cell as a number or a word; None where it says nothing."""
     if text.lower() in _MISSING:
         return None
-    try:
-        number = float(text)
-    except ValueError:
+    if not is_number(text, comma=False):
         return text
+    number = as_float(text)
     return number if math.isfinite(number) else None
+
+
+def check_number_in(head: str, value: float | str | None) -> float | None:
+    """Refuse a word as a coordinate of a position."""
+    if isinstance(value, str):
+        raise DataError(f"expected numbers{marks_within(value)} in the position {head}, got {value!r}")
+    return value
 
 
 def _axes(names: Sequence[str]) -> tuple[str, ...]:
@@ -202,8 +251,8 @@ def _column(head: str) -> str:
 
 def _matched(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], source: str
-) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]]]:
-    """Return columns, states before and after (n, c), and words, of the rows that belong to each movement."""
+) -> tuple[list[str], Array, Array, dict[str, tuple[str, ...]], NDArray[np.bool_]]:
+    """Return heads, states before and after (n, c) by the rows of each movement, words, and which lack a row (n,)."""
     lower = {head.lower(): head for head in cells}
     who = next((lower[name] for name in _MOVEMENTS if name in lower), None)
     moment = next((lower[name] for name in _MOMENTS if name in lower), None)
@@ -217,7 +266,7 @@ def _matched(
     words: dict[str, tuple[str, ...]] = {}
     values = np.full((len(next(iter(cells.values()))), len(heads)), np.nan)
     for k, head in enumerate(heads):
-        column = [_value(text) for text in cells[head]]
+        column = [value_of(text) for text in cells[head]]
         if any(isinstance(value, str) for value in column):
             column = [value if value is None or isinstance(value, str) else f"{value:g}" for value in column]
             words[_column(head)] = tuple(sorted({str(value) for value in column if value is not None}))
@@ -231,7 +280,7 @@ def _matched(
             f"{first_names([record['name'] or str(record['id']) for record in read.records(library.store, ids)], 5)}"
         )
     padded = np.vstack((values, np.full(len(heads), np.nan)))  # row -1: nothing is known
-    return [_column(head) for head in heads], padded[before], padded[after], words
+    return heads, padded[before], padded[after], words, (before < 0) | (after < 0)
 
 
 def _rows_by_moment(
@@ -259,7 +308,7 @@ def _rows_by_time(
     library: ActionLibrary, ids: NDArray[np.int64], cells: Mapping[str, list[str]], heads: tuple[Any, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     who, _, time = heads
-    clock = np.array([_number(text, time) for text in cells[time]])
+    clock = _seconds(cells[time], time)
     rows_of: dict[PurePath, list[int]] = {}
     for row, text in enumerate(cells[who] if who else [""] * len(clock)):
         rows_of.setdefault(PurePath(text.removesuffix(PurePath(text).suffix)), []).append(row)
@@ -296,11 +345,12 @@ def _rows_by_time(
     return before, after
 
 
-def _number(text: str, head: str) -> float:
-    value = _value(text)
-    if not isinstance(value, float):
-        raise DataError(f"expected numbers [s] in the column {head}, got {text!r}")
-    return value
+def _seconds(texts: Sequence[str], head: str) -> Array:
+    """Return times [s] in the unit that their head ends in, as of recordings, by default seconds."""
+    values, unit = list(map(value_of, texts)), unit_in_head(head) or "s"
+    if (wrong := next((k for k, value in enumerate(values) if not isinstance(value, float)), None)) is not None:
+        raise DataError(f"expected numbers [{unit}] in the column {head}, got {texts[wrong]!r}")
+    return in_seconds(np.array(values, dtype=np.float64), unit)
 
 
 def _merged(

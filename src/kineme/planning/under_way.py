@@ -63,17 +63,20 @@ def frame_of(plan: Plan, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
     return Frame([_AXES.index(axis) for axis in axes], as_point("origin", origin, _AXES))
 
 
-def monitored(library: ActionLibrary, robot: Robot, frame: Frame) -> Callable[[Step, RobotMovement], Watcher]:
+def monitored(
+    plan: Plan, library: ActionLibrary, robot: Robot, frame: Frame
+) -> Callable[[Step, RobotMovement], Watcher]:
     """Return what stops a step where it leaves what was shown of its symbol: `ActionLibrary.monitor`.
 
     Movements of more than places, as with orientations, are not watched so: of these the tip does not tell enough.
     """
 
     def watcher(step: Step, movement: RobotMovement) -> Watcher:
-        if library.primitives(ids=library[step.operator].members[:1]).n_dims != len(frame.axes):
+        symbol = plan.problem.domain.operator(step.operator).symbol
+        if library.primitives(ids=library[symbol].members[:1]).n_dims != len(frame.axes):
             return lambda t, tip: None
         ends = kinematics(robot, movement.trajectory.positions[[movement.first, -1]])[0]
-        monitor = library.monitor(step.operator, *map(frame.from_robot, ends), error_rate=_STOPPED)
+        monitor = library.monitor(symbol, *map(frame.from_robot, ends), error_rate=_STOPPED)
 
         def watch(t: float, tip: Array) -> str | None:
             state = monitor.update(t, frame.from_robot(tip))

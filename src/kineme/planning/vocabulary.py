@@ -17,16 +17,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.errors import SpecificationError
+from kineme.errors import DataError, SpecificationError
 from kineme.planning.skill import is_gripper
-from kineme.planning.states import HAND, State, States
+from kineme.planning.states import HAND, State, States, check_number_in, in_unit, value_of
 from kineme.reporting.text import first_names
+from kineme.units import split_head
 from kineme.validation import Array
 
 Fact = tuple[str, ...]  # a predicate and its arguments
@@ -63,6 +64,7 @@ class Vocabulary:
     radius: float  # in the unit of the recordings: what lies within it is at a place
     closed_above: bool | None  # whether the gripper is closed above its threshold; None where no movement tells
     left_out: Mapping[str, str]  # columns that say nothing here -> why
+    units: Mapping[str, str] = field(default_factory=dict)  # of columns, as far as they were said
 
     def of_kind(self, *kinds: str) -> list[Variable]:
         """Return the variables of some kinds, in order."""
@@ -77,6 +79,12 @@ class Vocabulary:
     def fixtures(self) -> list[str]:
         """Names of the fixtures."""
         return [variable.name for variable in self.of_kind("fixture")]
+
+    @property
+    def positions(self) -> list[str]:
+        """Columns of positions: of the hand and of objects."""
+        hand = [f"{HAND}_{axis}" for axis in self.axes]
+        return hand + [column for variable in self.of_kind("item", "fixture") for column in variable.columns]
 
     @property
     def tells_grasp(self) -> bool:
@@ -125,8 +133,8 @@ def vocabulary_of(states: States, radius: float | None = None) -> Vocabulary:
         else:
             variables.append(variable)
     variables = _told_apart(variables)
-    vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out)
-    return Vocabulary(states.axes, tuple(variables), near, _closed_above(states, vocabulary), left_out)
+    vocabulary = Vocabulary(states.axes, tuple(variables), near, None, left_out, states.units)
+    return replace(vocabulary, closed_above=_closed_above(states, vocabulary))
 
 
 def kind_of(name: str) -> str:
@@ -227,6 +235,44 @@ def _closed_above(states: States, vocabulary: Vocabulary) -> bool | None:
         carried |= goes_along & (np.linalg.norm(moved, axis=1) > vocabulary.radius)
     votes = [int((carried & steady & (levels[0] == level)).sum()) for level in (False, True)]
     return None if votes[0] == votes[1] else votes[1] > votes[0]
+
+
+def state_in(vocabulary: Vocabulary, state: State) -> dict[str, Any]:
+    """Return a state in the columns of a vocabulary and in their units; refuse words where a position is expected."""
+    result: dict[str, Any] = {}
+    for head, column in _meant(vocabulary, state).items():
+        if column in result:
+            raise DataError(f"expected one column {column} in the state, got several, the last is {head}")
+        value = state[head]
+        if column in vocabulary.positions and isinstance(value, str):
+            value = check_number_in(head, value_of(value))
+        is_text = isinstance(value, str | None)
+        result[column] = value if is_text else in_unit(value, head, vocabulary.units.get(column))
+    return result
+
+
+def _meant(vocabulary: Vocabulary, state: State) -> dict[str, str]:
+    """Return head of a state -> column, which is one of the vocabulary in any case if one alone is meant."""
+    plain = {head: split_head(head)[0] for head in state}
+    known = [*vocabulary.positions, *(each.columns[0] for each in vocabulary.of_kind(*_TELLING)), *vocabulary.left_out]
+    lower = [column.lower() for column in known]
+    free = {
+        name: column
+        for name, column in zip(lower, known, strict=True)
+        if lower.count(name) == 1 and column not in plain.values()
+    }
+    return {head: free.get(column.lower(), column) for head, column in plain.items()}
+
+
+def unit_notes(vocabulary: Vocabulary, state: State) -> list[str]:
+    """Say of which positions of a state the units are not told apart from those of a vocabulary, for want of one."""
+    positions = {head: column for head, column in _meant(vocabulary, state).items() if column in vocabulary.positions}
+    units = {(split_head(head)[1] or "", vocabulary.units.get(column, "")) for head, column in positions.items()}
+    bare, others = {unit for own, unit in units if not own} - {""}, {own for own, unit in units if not unit} - {""}
+    return [
+        *(f"positions whose heads say no unit are taken in {unit}, that of the recordings" for unit in sorted(bare)),
+        *(f"positions in {unit} are taken as they are: the domain says no unit of them" for unit in sorted(others)),
+    ]
 
 
 def position_of(names: Sequence[str], state: State) -> Array:
