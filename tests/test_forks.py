@@ -17,6 +17,7 @@ from kineme.errors import DataError
 from kineme.kernels import Laplacian
 from kineme.library.storage import safety
 from kineme.runtime import compiled, forks, parallel
+from soaking import slow
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
 
@@ -93,7 +94,7 @@ def beside(library):  # so that they end before the library is closed
     assert not failed
 
 
-@pytest.mark.parametrize("fork", [fork, fork_by_multiprocessing])
+@pytest.mark.parametrize("fork", [fork, slow(fork_by_multiprocessing)])
 def test_children_work_while_threads_of_the_parent_do(monkeypatch, beside, library, movements, fork):
     monkeypatch.setenv("KINEME_NUM_THREADS", "2")
     rows = np.random.default_rng(1).normal(size=(300, 20))

@@ -76,6 +76,7 @@ def run(code, **environment):
     return done.stdout
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("first", ["users_own", "recognizer.stream"][: 1 + SOAK])
 def test_threads_may_make_the_first_compiled_call_at_the_same_time(first):
     run(THREADS.replace("FIRST", first))

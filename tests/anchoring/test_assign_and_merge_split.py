@@ -126,6 +126,7 @@ def test_one_symbol_or_one_member():
     assert [(one.first, one.second) for one in suggest_merges(demos, labels)] == [("c", "kind 00")]
 
 
+@pytest.mark.soak
 def test_many_members_speak_through_some(monkeypatch):
     monkeypatch.setattr("kineme.anchoring.assignment._LARGEST", 2000)  # 400 of one symbol
     demos = draw_kinds([1300, 900], 2, 0, spread=0.03)

@@ -14,10 +14,11 @@ from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.reporting.figures import flat, principal_axes, save_figure
 from kineme.similarity.describe import paths_of
+from soaking import slow
 from unlabeled_samples import draw_kinds
 
 
-@pytest.mark.parametrize("d", [1, 2, 3, 4])
+@pytest.mark.parametrize("d", [1, 2, slow(3), slow(4)])
 def test_pictures_of_any_dimension_are_written(d, tmp_path):
     demos = draw_kinds([5, 4, 2], d, 0)
     proposals = propose(demos)

@@ -299,6 +299,7 @@ def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
     assert recovered(demos.labels[solids], named) >= 0.9
 
 
+@pytest.mark.soak
 def test_digits_of_five_people_are_ten_clusters(digits):
     """By themselves one more or less: one digit may be two; all right if ten are asked for."""
     demos, _ = digits

@@ -184,6 +184,7 @@ def test_a_person_names_splits_rejects_and_quits(folder, tmp_path):
     assert answer("library", "history", "-l", folder)[-1]["action"] == "reject"
 
 
+@pytest.mark.soak
 def test_the_end_of_the_input_ends_the_dialogue(folder, tmp_path):
     person = Terminal("anchor", "-l", folder, "--pictures", "pictures", cwd=tmp_path)
     person.until("name:")

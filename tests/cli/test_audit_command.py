@@ -142,6 +142,7 @@ def test_a_set_without_stamps_is_audited_too(tmp_path):
     assert slower["seconds"] == pytest.approx(2 * data["seconds"])
 
 
+@pytest.mark.soak
 def test_the_command_runs_as_a_program(data_set):
     command = [sys.executable, "-m", "kineme", "audit", data_set]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -12,6 +12,7 @@ from commands import answer, run, start
 
 from bench.work_sets import write_set
 from robot_array_sets import write_buffer
+from soaking import slow
 from work_samples import NAMES, TASKS, work_episodes
 
 pytest.importorskip("pyarrow")
@@ -82,6 +83,7 @@ def test_proposals_join_a_library_that_learned_from_the_data_set(dataset, tmp_pa
     assert answer("discover", dataset, "--library", tmp_path / "whole")["version"] > 1
 
 
+@pytest.mark.soak
 @pytest.mark.usefixtures("without_pictures")
 def test_a_library_of_another_feature_annotates_the_set_and_says_what_is_missing_in_others(dataset, tmp_path):
     """Its columns are called by their feature; the set has them although the one read by default is another."""
@@ -174,7 +176,7 @@ def _lerobot(path, states):
     return write_set(path, episodes, [*episodes[0].signals])
 
 
-@pytest.mark.parametrize("write", [_robomimic, _aloha, _umi, _buffer, _lerobot])
+@pytest.mark.parametrize("write", [slow(_robomimic), slow(_aloha), slow(_umi), slow(_buffer), _lerobot])
 @pytest.mark.usefixtures("without_pictures")
 def test_what_was_discovered_in_any_layout_annotates_it_without_options(write, tmp_path):
     states = [episode.signals["observation.state"] for episode in work_episodes(8)[0]]

@@ -81,6 +81,7 @@ def test_recordings_without_times_are_evaluated_with_the_step_between_samples(tm
     assert "expected --units with recordings, got it with lasa alone" in alone.stderr
 
 
+@pytest.mark.soak
 def test_data_that_are_not_there_are_one_line_and_exit_status_1(tmp_path):
     done = run(tmp_path / "nothing", "--out", tmp_path / "out", by=commands.start)
     assert done.returncode == 1
@@ -129,6 +130,7 @@ def archives(tmp_path_factory, make_movement):
     return folder
 
 
+@pytest.mark.soak
 def test_several_data_sets_have_a_folder_each_and_a_table_and_a_diagram_together(archives, tmp_path):
     methods = [part for name in ("kineme", "euclidean", "plus-cloud") for part in ("--method", name)]
     protocols = [part for name in ("user-dependent", "user-independent") for part in ("--protocol", name)]

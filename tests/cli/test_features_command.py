@@ -31,6 +31,7 @@ def _bytes(folder):
     return {path.name: path.read_bytes() for path in [*folder.glob("part-*"), folder / "bases.npz"]}
 
 
+@pytest.mark.soak
 def test_shards_of_processes_are_the_same_and_find_every_movement(work, tmp_path):
     command = ("features", work / "archive", "-l", work / "actions")
     assert answer(*command, "-o", tmp_path / "one")["recordings"] == 9

@@ -119,6 +119,7 @@ def test_symbols_that_a_message_does_not_name_are_counted(monkeypatch):
         check_symbols(SimpleNamespace(folder="actions"), ["wave"])
 
 
+@pytest.mark.soak
 def test_the_command_names_near_symbols_and_shows_a_table(work):
     folder, _ = work
     refused = run("find", "stirr", folder / "set", "-l", folder / "actions")

@@ -12,6 +12,7 @@ import pytest
 import kineme
 from kineme.io.reading.recordings import read_recording
 from kineme.io.writing.write_movement import write_movement
+from soaking import slow
 
 
 def run(*arguments, by=commands.run, **options):
@@ -77,14 +78,14 @@ def test_it_steers_around_an_obstacle_on_the_path_and_arrives(recording, tmp_pat
     np.testing.assert_allclose(path[-1], json.loads(plain.read_text())["positions"][-1], atol=0.2)
 
 
-@pytest.mark.parametrize(("ending", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")])
+@pytest.mark.parametrize(("ending", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), slow(".pdf", b"%PDF")])
 def test_it_draws(recording, tmp_path, ending, magic):
     done = run(recording, "--goal", "3,3", "-o", tmp_path / "new.csv", "--plot", tmp_path / f"new{ending}")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / f"new{ending}").read_bytes().startswith(magic)
 
 
-@pytest.mark.parametrize("d", [1, 3, 7])
+@pytest.mark.parametrize("d", [1, slow(3), 7])
 def test_any_number_of_dimensions(tmp_path, d):
     u = np.linspace(0, 1, 60)
     positions = (u**3 * (10 - 15 * u + 6 * u**2))[:, None] * np.arange(1, d + 1)

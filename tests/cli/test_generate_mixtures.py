@@ -10,7 +10,7 @@ from kineme.dmp.generation.figure import draw_movement, path_columns
 from kineme.dmp.generation.generate import MovementOptions, generate, largest_deviation, learn_one
 from kineme.io.writing.write_movement import write_movement
 from kineme.orientation import exp, log, product
-from soaking import combined
+from soaking import combined, slow
 
 U = np.linspace(0, 1, 80)
 S = U**3 * (10 - 15 * U + 6 * U**2)
@@ -80,7 +80,10 @@ def test_it_moves_as_shown_in_the_columns_that_were_recorded(case, recording, tm
             np.testing.assert_allclose(replayed, was.recorded[:, k], atol=1e-3, err_msg=name)
 
 
-@pytest.mark.parametrize(("case", "ending"), combined(HEADS, [".csv", ".npz", ".json"], together=1))
+FORMATS = combined(HEADS, [".csv", ".npz", ".json"], together=1)
+
+
+@pytest.mark.parametrize(("case", "ending"), [FORMATS[0], *(slow(*row) for row in FORMATS[1:])])
 def test_a_goal_is_met_in_every_format_at_another_tempo(case, ending, recording, tmp_path):
     path, out = recording(case), tmp_path / f"new{ending}"
     done = run(

@@ -16,6 +16,7 @@ from kineme.cli.main import main
 from kineme.cli.options import GroupedCommand, heading, headings, under
 from kineme.cli.reading import LAYOUT_OPTIONS
 from kineme.runtime import compiled
+from soaking import slow
 
 
 def run(*arguments):
@@ -74,7 +75,7 @@ def test_an_error_is_one_line_and_says_nothing_to_the_terminal(tmp_path):
     assert r"\x1b[31m" in done.stderr
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+@pytest.mark.parametrize("encoding", ["latin-1", slow("utf-8")])
 def test_the_output_may_be_in_any_encoding(tmp_path, encoding):
     name = "→ é \U0001f44b \x9b31m"
     with kineme.ActionLibrary(tmp_path, create=True) as library:

@@ -51,6 +51,7 @@ def test_annotations_of_shards_are_those_of_one_process(work, tmp_path):
     assert (tmp_path / "copy" / "meta" / "kineme" / "motions.parquet").is_file()
 
 
+@pytest.mark.soak
 def test_processes_answer_as_shards_do(work, tmp_path):
     command = ("annotate", work / "archive", "-l", work / "actions")
     _shards(tmp_path / "shards", *command)
@@ -74,6 +75,7 @@ def test_a_version_that_another_one_has_replaced_makes_its_parts_stale(work, tmp
     assert "second" in (tmp_path / "gathered.csv").read_text()
 
 
+@pytest.mark.soak
 def test_hits_are_those_of_find(work, tmp_path):
     command = ("find", "tap", work / "archive", "-l", work / "actions")
     run(*command, "-o", tmp_path / "here.csv")
@@ -150,6 +152,7 @@ def test_a_poisoned_piece_ends_with_3_and_is_named(work, tmp_path):
     assert "damaged" in done.stdout
 
 
+@pytest.mark.soak
 def test_a_piece_that_takes_too_long_ends_with_3(work, tmp_path):
     done = run("inspect", work / "archive", "-o", tmp_path / "out", "--workers", 1, "--time-limit", 1e-6)
     assert (done.returncode, done.stdout.count("was not done within 1e-06 min")) == (3, 3)

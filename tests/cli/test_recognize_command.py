@@ -159,6 +159,7 @@ def test_a_symbol_for_a_planner(folder, tmp_path):
     np.testing.assert_allclose(path.positions[0, -1], grounding["demonstrated"]["goal"]["median"], atol=1.0)
 
 
+@pytest.mark.soak
 def test_what_is_near_and_between(folder, tmp_path):
     near = answer("library", "nearest", "GShape", "-k", 2, "-l", folder)
     assert near[0]["symbol"] == "CShape"
@@ -183,6 +184,7 @@ def test_the_shell_completes_commands(words, expected):
     assert _completed(words) == ([expected] if expected else [])
 
 
+@pytest.mark.soak
 def test_the_shell_completes_symbols_of_the_library_on_the_line(folder):
     assert _completed(f"kineme library show -l {folder} N") == ["NShape"]
     assert _completed(f"kineme generate -l {folder} G") == ["GShape"]

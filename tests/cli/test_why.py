@@ -63,6 +63,7 @@ def test_a_movement_that_is_not_there_is_refused(folder, recording):
     assert "expected less than 2 movements, got 2" in done.stderr
 
 
+@pytest.mark.soak
 def test_the_command_runs_by_itself(folder, recording):
     done = start("why", recording.name, "-l", folder, cwd=recording.parent)
     assert done.returncode == 0, done.stderr

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 import kineme
 from kineme.dmp.discrete.rollout import BaseRollout
 from kineme.orientation import PoseDMP, exp
+from soaking import slow
 
 
 def discrete():
@@ -135,7 +136,7 @@ def _axis_labels(axes):
     return axes.get_xlabel(), axes.get_ylabel()
 
 
-@pytest.mark.parametrize("d", [1, 2, 3, 9])
+@pytest.mark.parametrize("d", [1, slow(2), 3, slow(9)])
 def test_a_picture_has_any_number_of_dimensions_and_not_too_many_lines(make_movement, d):
     primitive = kineme.DMP(n_basis=10).learn([make_movement(1, d)[1]])
     figure = primitive.rollout(goal=np.random.default_rng(0).normal(size=(500, d)), n_samples=20).plot()

@@ -29,6 +29,7 @@ def test_whole_files_are_read_and_damaged_ones_refused_in_words(child, name):
     assert any(outcome.how == "refused" for outcome in outcomes)
 
 
+@pytest.mark.soak
 def test_metadata_that_end_the_process_are_not_asked_for(child):
     """pyarrow aborts on damaged statistics of columns, if one looks at them."""
     data = samples()["wide.parquet"]

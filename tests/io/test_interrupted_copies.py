@@ -14,6 +14,7 @@ from kineme.io.reading.episodes import read_episodes
 from kineme.io.writing.annotations import Annotation, write_annotations
 from kineme.reporting.atomic import whole_folder
 from lerobot_sets import write_lance, write_v2, write_v3
+from soaking import slow
 
 CHILD = """
 import sys, time
@@ -56,9 +57,9 @@ def killed(source, target, module, step):
     ("write", "module", "step"),
     [
         (write_v3, "copy", "_write_shard"),
-        (write_v2, "copy", "declare"),
-        (write_v3, "copy", "declare"),
-        (write_lance, "copy", "_commit"),
+        slow(write_v2, "copy", "declare"),
+        slow(write_v3, "copy", "declare"),
+        slow(write_lance, "copy", "_commit"),
         (write_lance, "copy", "declare"),
     ],
 )

@@ -230,6 +230,7 @@ def test_a_library_of_other_columns_is_refused(worked, tmp_path):
         assert library.version == 1
 
 
+@pytest.mark.soak
 def test_discovered_movements_do_not_join_symbols_that_merely_look_alike(worked, tmp_path):
     episodes, _, discovery = worked
     with ActionLibrary(tmp_path / "actions", create=True) as library:  # that takes out place and size

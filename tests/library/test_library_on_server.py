@@ -34,6 +34,7 @@ from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import repeated
 from kineme.studio.page.write_page import write_page
 from kineme.studio.server.app import create_app
+from soaking import slow
 
 
 @contextmanager
@@ -338,7 +339,7 @@ def test_a_connection_that_is_cut_before_a_commit_leaves_nothing(library, monkey
     assert library.verify() == []
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGQUIT])
+@pytest.mark.parametrize("how", [signal.SIGINT, slow(signal.SIGQUIT)])
 def test_a_server_that_stops_and_starts_in_mid_commit_leaves_nothing(library, server, monkeypatch, how):
     def restart():
         server.stop(how)

@@ -20,6 +20,7 @@ from kineme.library import proposals
 from kineme.library.proposals import known_symbols
 from kineme.library.recognize import LibraryRecognizer
 from kineme.library.storage.connection import FILE
+from soaking import slow
 
 PEOPLE = ["anna", "ben", "cleo"]
 
@@ -82,7 +83,7 @@ def test_a_large_library_calibrates_people_as_the_recognizer_does(tmp_path, copi
         assert (other.scales < 0.7 * ours.scales).all()
 
 
-@pytest.mark.parametrize("alike", [True, False], ids=["equally many", "nearly all by one"])
+@pytest.mark.parametrize("alike", [slow(True), False], ids=["equally many", "nearly all by one"])
 def test_large_classes_compare_no_one_with_oneself(tmp_path, alike):
     """Also where only some of a class calibrate it, and the others are compared by their bounds."""
     paths, labels, groups = _shown(n_kinds=2, people=[f"p{k}" for k in range(12 if alike else 2)], copies=18 * 12)

@@ -138,6 +138,7 @@ def test_a_large_library_without_weight_on_positions_answers_as_the_nearest_of_a
     assert [answer.ranked[0] for answer in answers] == expected.tolist()
 
 
+@pytest.mark.soak
 def test_large_classes_keep_the_error_rate(make):
     """New members of classes larger than what is sampled of them are unknown about as often as was asked for."""
     kinds = _kinds([200] * 4, seed=7, spread=0.1)

@@ -41,6 +41,7 @@ def test_review_names_what_is_one_and_what_is_two(folder):
         assert library.review().merges == library.review().splits == ()
 
 
+@pytest.mark.soak
 def test_the_shell_reviews_and_splits(folder):
     def run(*arguments):
         done = CliRunner().invoke(main, ["library", *map(str, arguments), "-l", str(folder)], catch_exceptions=False)

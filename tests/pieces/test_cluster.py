@@ -81,6 +81,7 @@ def test_another_version_on_a_worker_is_refused(client, tmp_path, monkeypatch):
         map_pieces(lengths, write_archive(tmp_path / "archive", 3), client, output=tmp_path / "out")
 
 
+@pytest.mark.soak
 def test_a_scheduler_that_is_not_there_is_said():
     with (
         pytest.raises(DataError, match="expected a scheduler of Dask"),

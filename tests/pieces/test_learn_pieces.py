@@ -155,6 +155,7 @@ def one(archive):
     return of_one_process(archive.with_name("one"), [archive])
 
 
+@pytest.mark.soak
 def test_processes_learn_it_too(archive, one, tmp_path, small_pieces):
     rows, said = by_pieces(tmp_path / "library", [archive], by=[("--workers", 2)])
     assert_same(rows, one)

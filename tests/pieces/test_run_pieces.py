@@ -113,6 +113,7 @@ def test_a_piece_that_ends_its_process_fails_alone(archive, tmp_path):
     assert len(outcomes) == len(plan(str(archive), SIZE).pieces)
 
 
+@pytest.mark.soak
 def test_a_process_that_is_ended_once_costs_nothing(archive, parts, tmp_path, monkeypatch):
     monkeypatch.setenv("KINEME_TEST_MARK", str(tmp_path / "mark"))
     outcomes = map_pieces(piece_work.deadly_once, archive, output=tmp_path / "out", size=SIZE, workers=2)

@@ -203,6 +203,7 @@ def test_a_process_that_dies_is_started_again_and_the_request_answered(served):
     assert before[0] not in after
 
 
+@pytest.mark.soak
 def test_a_terminal_shows_how_far_indexes_are(folders, tmp_path):
     shutil.copytree(folders[1], tmp_path / "shards", ignore=shutil.ignore_patterns("search-*"))
     termios = pytest.importorskip("termios")
@@ -269,6 +270,7 @@ def test_an_address_of_a_network_needs_a_token(folders, monkeypatch):
         serve_search(SearchOptions(*folders, host="0.0.0.0", port=0), _fail)
 
 
+@pytest.mark.soak
 def test_shards_of_another_library_are_refused(folders, tmp_path):
     other = samples.library(tmp_path / "other", n=30)
     with pytest.raises(SpecificationError, match="another one"):

@@ -497,6 +497,7 @@ def over_stdio(act, *arguments, responses=(YES,)):
     return anyio.run(run)
 
 
+@pytest.mark.soak
 def test_the_command_reads_only_unless_told_otherwise(folder, library):
     before = {path: path.stat().st_mtime_ns for path in folder.iterdir()}
 
@@ -524,6 +525,7 @@ def test_the_command_opens_the_library_for_reading_and_passes_its_options_on(fol
     assert served == [(True, ["list_skills", "explain_skill", "preview_carry"], joints, None)]
 
 
+@pytest.mark.soak
 def test_the_command_writes_what_was_approved_into_new_files(folder, library, tmp_path):
     goals = tmp_path / "goals"
     goals.mkdir()

@@ -106,6 +106,7 @@ def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
     assert evidence.POWER == 3.0
 
 
+@pytest.mark.soak
 def test_pauses_of_beginnings_count_longer_than_those_of_whole_movements():
     """Of 208 beginnings of LASA 181 are recognized after 30 % of their path; 174 with pauses cut as in whole ones."""
     demos = kineme.load_lasa()

@@ -16,6 +16,7 @@ from kineme.orientation import exp, product
 from kineme.recognition import Monitor
 from kineme.recognition.early.live_state import LiveStatus
 from kineme.recognition.monitor import N_PHASES, corridor, jitter
+from soaking import slow
 
 TIMES = np.linspace(0.0, 2.0, 120)
 
@@ -188,7 +189,7 @@ def test_a_monitor_that_is_reset_knows_nothing_of_what_was(fresh):
     assert distances(fresh, TIMES, movement) == expected
 
 
-@pytest.mark.parametrize("d", [1, 2, 7, 63])
+@pytest.mark.parametrize("d", [1, 2, 7, slow(63)])
 def test_in_any_number_of_dimensions(d):
     monitor, movement = Monitor.of(draw(20, d=d)), draw(1, 16, d=d)[0].positions
     assert monitor.update(TIMES, movement).largest < 1.2 * monitor.shown.threshold

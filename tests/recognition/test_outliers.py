@@ -45,11 +45,13 @@ def test_wrong_labels_of_digits_are_found_and_few_others(digits, share, least):
     assert n_others <= 0.05 * (n_detected + n_others)
 
 
+@pytest.mark.soak
 def test_real_recordings_as_they_are_have_almost_none(gestures, digits):
     for demos, _ in (gestures, digits):
         assert len(find_outliers(demos).outliers) <= 0.005 * len(demos)
 
 
+@pytest.mark.soak
 def test_movements_of_an_action_that_has_no_label_are_found(gestures):
     demos, _ = gestures
     labels = np.asarray(demos.labels, dtype=str)

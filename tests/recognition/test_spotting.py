@@ -362,6 +362,7 @@ def test_windows_are_the_same_compiled_and_plain(monkeypatch):
     assert found[0][-1][-1] == found[1][-1][-1] == 1.0
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(("rests", "least"), [(True, 0.8), (False, 0.72)][: 1 + SOAK])
 def test_gestures_of_twenty_kinds_are_found_by_templates_of_other_people(gestures, rests, least):
     """Precision was 0.65 when the chosen window alone, over the scale of each class, told the class."""

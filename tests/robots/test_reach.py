@@ -116,6 +116,7 @@ def test_what_joints_showed_is_executed_as_fast_though_another_way_would_be_slow
     assert move(movement, robot, follow=follow, timing="slowed", rate=50.0).factor < 1.1
 
 
+@pytest.mark.soak
 @settings(max_examples=examples(1, 2))
 @example(name="so101", seed=676, share=0.34)
 @given(name=st.sampled_from(list(SEEDS)), seed=st.integers(0, 999), share=st.floats(0.3, 0.97))

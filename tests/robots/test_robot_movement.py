@@ -259,6 +259,7 @@ def test_a_free_place_is_not_below_the_plane_on_which_the_arm_stands(name, lowes
     assert made.factor < 1.5  # and not where a joint comes to a stop
 
 
+@pytest.mark.soak
 def test_joints_that_come_to_a_stop_stay_within_their_limits_between_samples():
     robot = load("so101")
     u = np.linspace(0, 1, 120)

@@ -60,6 +60,7 @@ def test_of_the_two_timings_the_shorter_that_passes_is_taken(monkeypatch, along_
     assert robot_movement.with_timing(planned, "fastest").name == chosen
 
 
+@pytest.mark.soak
 def test_what_a_refusal_promises_holds():
     robot = load("ur5e")
     for movement in (stroke(robot, 0.02), swing(robot, 0.3), stroke(robot, 0.4))[: 2 + SOAK]:

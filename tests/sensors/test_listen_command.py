@@ -17,6 +17,7 @@ from sensor_samples import make_library, take
 
 import kineme
 from kineme.cli import main
+from soaking import slow
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def _free_port():
         return probe.getsockname()[1]
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("how", [signal.SIGINT, slow(signal.SIGTERM)])
 def test_a_process_names_what_is_sent_to_it_and_ends_cleanly(folder, how):
     udp_client = pytest.importorskip("pythonosc.udp_client", reason="no python-osc; pip install python-osc")
     port = _free_port()

@@ -193,7 +193,7 @@ def test_movements_of_people_are_recognized_as_in_python(name):
         slow({}, 13),
         ({"points": 2}, 4),
         slow({"points": 2}, 6),
-        ({"points": 5, "max_angle": np.pi / 3}, 10),
+        slow({"points": 5, "max_angle": np.pi / 3}, 10),
         slow({"points": 15}, 45),
         slow({"points": 3, "translation": False}, 9),
         slow({"points": 6, "max_angle": np.pi, "classifier": "prototype"}, 18),

@@ -95,6 +95,7 @@ def test_a_library_answers_in_the_runtime_as_it_does_in_python(tmp_path):
         compare_answers(snapshot_of_library(library), others, library.recognize(others))
 
 
+@pytest.mark.soak
 @pytest.mark.skipif(NODE is None, reason=REASON)
 def test_a_library_of_two_hands_answers_in_the_runtime_as_it_does_in_python(tmp_path, monkeypatch):
     """Names of columns tell that they are points."""

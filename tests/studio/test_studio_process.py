@@ -154,6 +154,7 @@ def test_killed_at_any_time_nothing_that_was_answered_is_lost(folder):
             assert key in library[name].members
 
 
+@pytest.mark.soak
 def test_two_browsers_the_command_line_and_python_write_side_by_side(folder):
     names = []
 
@@ -244,6 +245,7 @@ def test_a_damaged_data_set_is_refused_before_a_library_is_made(tmp_path):
     assert (code, "meta/info.json" in said, (tmp_path / "actions").exists()) == (1, True, False)
 
 
+@pytest.mark.soak
 def test_recordings_are_opened_by_a_path_of_the_command_line(folder, tmp_path):
     demos = write_drawings(tmp_path / "demos", (0, 1), (2,))
     with running(folder, "--recordings", demos) as studio:

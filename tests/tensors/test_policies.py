@@ -53,6 +53,7 @@ def test_a_policy_learns_through_its_chunks():
     assert loss < 1e-3
 
 
+@pytest.mark.soak
 def test_the_policy_of_the_example_learns_to_hit_moving_goals(tmp_path):
     script = Path(__file__).parents[2] / "examples" / "moving_goal_policy.py"
     names = runpy.run_path(str(script))

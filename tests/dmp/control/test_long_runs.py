@@ -43,6 +43,7 @@ def test_memory_is_flat_and_rest_is_rest(bio):
         tracemalloc.stop()
 
 
+@pytest.mark.soak
 def test_after_a_day_it_still_moves_to_a_new_goal(bio):
     controller = bio.controller(0.02)
     for _ in range(43_200):

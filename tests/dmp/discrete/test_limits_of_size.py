@@ -37,6 +37,7 @@ def test_wishes_too_large_are_refused_by_name(primitive, wish, words):
         primitive.rollout(**wish)
 
 
+@pytest.mark.soak
 def test_as_many_samples_as_are_allowed_are_the_same_as_few(primitive, agree):
     """Computed in several blocks of steps."""
     many = primitive.rollout(n_samples=100_001)

@@ -18,7 +18,7 @@ from kineme_experiments.evaluation.protocols import PROTOCOLS, usable_shots
 from kineme_experiments.evaluation.score_split import does, score_split
 from kineme_experiments.evaluation.spotting import Stretch, concatenate_all
 from kineme_experiments.evaluation.trials import TASKS, Settings
-from soaking import SOAK
+from soaking import SOAK, slow
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
 AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable()]
@@ -189,7 +189,7 @@ def test_robustness_grows():
     assert len({one for one, _ in conditions}) == len(conditions)
 
 
-@pytest.mark.parametrize("d", [1, 5])
+@pytest.mark.parametrize("d", [slow(1), 5])
 def test_other_dimensions_are_not_turned(make_small, d, monkeypatch):
     monkeypatch.setenv("KINEME_COMPILED", "never")  # to compile for these alone would take longer than all else
     conditions = robustness_conditions(d)

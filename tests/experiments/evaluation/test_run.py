@@ -61,6 +61,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not(data, done, tmp
     assert without_times(other.files[1]) != without_times(numbers)
 
 
+@pytest.mark.soak
 def test_two_processes_give_what_one_gives(data, tmp_path):
     plan = ["few-shot", "user-independent"] if SOAK else ["few-shot"], ["kineme", "euclidean"]
     files = [run(data, tmp_path / str(k), plan, processes=k).files for k in (1, 2)]

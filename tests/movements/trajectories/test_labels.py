@@ -67,6 +67,7 @@ def test_labels_that_differ_in_trailing_nuls_stay_different():
     assert Recognizer().fit(demos).predict(demos).tolist() == ["a", "a", "a\0", "a\0"]
 
 
+@pytest.mark.soak
 def test_one_long_label_costs_its_own_length(tmp_path):
     long = "x" * 2**20
     lines = ["movement,label,t,x"]
