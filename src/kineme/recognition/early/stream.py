@@ -172,12 +172,14 @@ class Live:
 
     def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
         elapsed = float(samples[-1, 0] - samples[0, 0])
-        times, positions = _uninterrupted(samples, ALLOWANCE)
-        how, unpaused = self._comparison.specification, _uninterrupted(samples)
+        recorded = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
+        clean = recorded[0], without_glitches(recorded[1], np.array([0, len(samples)]))
+        times, positions = _without_pauses(*clean, ALLOWANCE)
+        how, unpaused = self._comparison.specification, _without_pauses(*clean)
         even = _smooth(times, positions, how.cutoff)
         whole = _smooth(*unpaused, how.cutoff)
         if how.are_signals(positions.shape[1]):
-            unpaused = _uninterrupted(samples, rests=False)
+            unpaused = _without_pauses(*clean, rests=False)
         details = _smooth(*unpaused, how.detailed_cutoff) if how.detailed else whole
         so_far = describe_begun(self._hypotheses, even, samples[:1, 1:], times[-1:] - times[0], (whole, details))
         evidence = log_evidence(self._hypotheses, so_far)
@@ -210,11 +212,11 @@ def _smooth(times: Array, positions: Array, cutoff: float | None) -> Array:
     return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
 
-def _uninterrupted(samples: Array, allowance: float = 1.0, *, rests: bool = True) -> tuple[Array, Array]:
-    """Return times and positions of samples (k, 1 + d), as those of stored movements are described."""
-    times, offsets = np.ascontiguousarray(samples[:, 0]), np.array([0, len(samples)])
-    positions = without_glitches(np.ascontiguousarray(samples[:, 1:]), offsets)
-    cut = cut_pauses(times, positions, offsets, allowance, rests=rests)
+def _without_pauses(
+    times: Array, positions: Array, allowance: float = 1.0, *, rests: bool = True
+) -> tuple[Array, Array]:
+    """Return times (k,) and positions (k, d), as those of stored movements are described."""
+    cut = cut_pauses(times, positions, np.array([0, len(times)]), allowance, rests=rests)
     return (times, positions) if cut is None else cut[:2]
 
 
