@@ -21,7 +21,16 @@ from kineme.robots.kinematics import descent
 from kineme.robots.kinematics.pursuit import choose_place, choose_posture, pursue
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.planning import robot_movement
-from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, plane_of, roles_of, scales_of, space_of
+from kineme.robots.planning.roles import (
+    JOINT_UNITS,
+    SPACES,
+    check_count,
+    check_plausible,
+    plane_of,
+    roles_of,
+    scales_of,
+    space_of,
+)
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 PLACES = ("as given", "free")
@@ -80,7 +89,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     rate : float, default 100
         Samples per second of what is sent, 1 to 10,000.
     start : array_like of shape (n,), optional
-        Where the joints stand now; by default the rest posture. The approach begins there.
+        Where the joints stand now, in radians and meters; by default the rest posture. The approach begins there.
     steps : dict of str to array_like of shape (T,), optional
         Discrete channels, as of a gripper, at the samples of the movement: kept as steps, whatever the timing.
     continuous : dict of str to array_like of shape (T,), optional
@@ -252,11 +261,8 @@ def request_of(
     times, columns = recording.times, np.asarray(recording.recorded, dtype=float)
     space = space_of(recording.channels, columns, robot) if space == "auto" else space
     roles = roles_of(recording.channels, columns.shape[1], space, robot)
-    if space == "joints" and len(roles.positions) != robot.n_joints:
-        raise TrajectoryError(
-            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
-            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
-        )
+    if space == "joints":
+        check_count(roles, robot)
     scales = scales_of(roles, robot if space == "joints" else None, joint_units)
     positions = columns[:, roles.positions] * scales.size + scales.offset
     if space == "joints":

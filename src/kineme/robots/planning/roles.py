@@ -49,6 +49,7 @@ class Scales(NamedTuple):
 
     size: Array  # (n,)
     offset: Array  # (n,)
+    units: tuple[str, ...]  # of the recorded positions; "" if a caller gave the size alone
 
 
 def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot | None = None) -> Roles:
@@ -108,7 +109,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
     """
     n = len(roles.positions)
     size, offset = np.ones(n), np.zeros(n)
-    units = ("m",) * n if robot is None else robot.units
+    units = ["m"] * n if robot is None else [*robot.units]
     guessed = []
     for k, (channel, native) in enumerate(zip(roles.columns or (None,) * n, units, strict=False)):
         name, text = (f"column {k}", None) if channel is None else (channel.name, channel.unit)
@@ -126,6 +127,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
         if text is not None:
             ranged = robot if joint_units == "percent" else None
             size[k], offset[k] = _scale(name, text, native, ranged, k)
+            units[k] = text
     if guessed:
         warn(
             f"{', '.join(guessed)} are taken as degrees, as LeRobot's drivers give them unless use_degrees is False: "
@@ -133,7 +135,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
             UserWarning,
             3,
         )
-    return Scales(size, offset)
+    return Scales(size, offset, tuple(units))
 
 
 def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tuple[float, float]:
@@ -158,7 +160,22 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
     return float(unit.size), 0.0
 
 
-def check_plausible(positions: Array, robot: Robot) -> None:
+def check_count(roles: Roles, robot: Robot) -> None:
+    """Refuse another number of columns than the arm has joints."""
+    if len(roles.positions) != robot.n_joints:
+        raise TrajectoryError(
+            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
+            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
+        )
+
+
+_DEGREES = (
+    "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
+    "--joint-units"
+)
+
+
+def check_plausible(positions: Array, robot: Robot, remedy: str = _DEGREES) -> None:
     """Refuse joint positions (T, n) [rad, m] that are turns beyond the limits: degrees that are taken for radians."""
     beyond = np.maximum(positions.max(axis=0) - robot.upper, robot.lower - positions.min(axis=0))
     wrong = np.array([unit == "rad" for unit in robot.units]) & (beyond > tau)
@@ -167,9 +184,7 @@ def check_plausible(positions: Array, robot: Robot) -> None:
         value = positions[np.argmax(np.abs(positions[:, k])), k]
         raise TrajectoryError(
             f"expected radians between {robot.lower[k]:.4g} and {robot.upper[k]:.4g} of {robot.joints[k]}, got "
-            f"{value:.4g}; "
-            "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
-            "--joint-units"
+            f"{value:.4g}; {remedy}"
         )
 
 
