@@ -62,11 +62,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     scales = scaled or scales_of(roles, joints, joint_units)
     said: list[str] = []
     begin, end = (
-        p
-        if p is None
-        else as_point(name, p, "xyz")
-        if joints is None
-        else _joints(name, p, joints, roles, scales, said)
+        None if p is None else _joints(name, p, joints, roles, scales, said) if joints else as_point(name, p, "xyz")
         for name, p in (("at", at), ("goal", goal))
     )
     plane = plane_of(() if joints else roles.columns, plane)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from math import tau
 from typing import NamedTuple
@@ -24,6 +25,7 @@ DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
 _RATES = {"velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current"}
 _AXES = "xyz"
 _SIDES = ("left", "right")  # what names of two arms begin with
+_SIDE = re.compile("(left|right|l|r)(?:arm|joint)?")  # a word of a name that says of which arm it is
 _Words = tuple[str, ...]
 
 SPACES = ("auto", "tip", "joints")
@@ -84,11 +86,13 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     continuous = {}
     if joints is not None:
         if robot is not None and not are_unknown(channels):
+            _check_sides([names[k] for k in joints], robot)
             _warn_of_other_names([names[k] for k in joints], robot)
         continuous = {channel.name: column for k, (channel, column) in enumerate(along) if k not in joints}
         along = [along[k] for k in joints]
     elif robot is not None and space == "joints" and len(along) == robot.n_joints:
         check_order(names, robot)
+        _check_sides(names, robot)
     elif space == "tip" and len(along) in (2, 3):
         along = [along[k] for k in axis_order(names)]
     return Roles(
@@ -303,6 +307,24 @@ def _check_no_others(names: Sequence[str], robot: Robot) -> None:
             f"expected the joints {', '.join(robot.joints)}, got {', '.join(others)}, which {robot.name} has besides; "
             "choose the tip that they move (tip=, in the shell --tip), or rename the columns"
         )
+
+
+def _check_sides(names: Sequence[str], robot: Robot) -> None:
+    """Refuse columns, in the order of the joints, whose names say the other arm than those of joints, or of the tip."""
+    for name, joint in zip(names, robot.joints, strict=True):
+        said, meant = _side_said(name), _side_said(joint) or _side_said(robot.tip)
+        if said and meant and said != meant:
+            raise TrajectoryError(
+                f"expected a recording of the {meant} arm, as {joint} and the tip {robot.tip} say, got {name}, of the "
+                f"{said} one; choose the tip of that arm (tip=, in the shell --tip), other columns, or rename them"
+            )
+
+
+def _side_said(name: str) -> str:
+    """The side that words of a name say, spelled out or, where none is, by its letter; "" of none, and of both."""
+    said = [match[1] for word in words_of(split_head(name)[0]) if (match := _SIDE.fullmatch(word))]
+    sides = {side for side in said if side in _SIDES} or {side for side in _SIDES for word in said if word == side[0]}
+    return sides.pop() if len(sides) == 1 else ""
 
 
 def _warn_of_other_names(names: Sequence[str], robot: Robot) -> None:
