@@ -100,6 +100,18 @@ def test_a_gap_ends_the_movement_before_it(library):
     assert any(sentence.startswith("gap: no samples for 3.0 s") for sentence in heard.told)
 
 
+def test_a_movement_begins_behind_the_gap_in_which_a_hand_was_gone(library):
+    """The way across the gap, while nothing was under way, was taken for the first motion."""
+    heard, begins = Heard(library).feed(take("GShape")), []
+    for name in ("Sine", "WShape"):
+        heard.wait(1.5)
+        begins.append(heard.stamp)
+        heard.feed(take(name)[60:])
+    ended = [symbol for symbol in heard.symbols if symbol.is_over]
+    assert [symbol.name for symbol in ended] == ["GShape", "Sine", "WShape"]
+    assert all(symbol.start > begin for symbol, begin in zip(ended[1:], begins, strict=True))
+
+
 @pytest.mark.parametrize("by", [-3600.0, -2.0, 900.0])
 def test_a_clock_that_jumps_drops_the_movement_under_way_and_the_next_one_is_named(library, by):
     heard = Heard(library).feed(take("GShape")[:300])

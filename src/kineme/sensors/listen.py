@@ -241,9 +241,11 @@ class Listener:
             if step < 0.0 or waited + self.rests.silence < step < math.inf:
                 self.note("clock jumped", f"by {step:+.3g} s; the movement under way is dropped")
                 self._forget()
-            elif step > self.rests.silence and self._began is not None:
-                self.note("gap", f"no samples for {step:.1f} s; the movement under way ends before")
-                yield from self._end(self._last_time, t)
+            elif step > self.rests.silence:
+                if self._began is not None:
+                    self.note("gap", f"no samples for {step:.1f} s; the movement under way ends before")
+                    yield from self._end(self._last_time, t)
+                self._forget()  # else the way across the gap is motion, and a movement begins before it
             self._last_time, waited = t, 0.0
             extent = self._remember(t, rows[k])
             if self._began is None:
