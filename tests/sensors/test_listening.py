@@ -84,8 +84,9 @@ def test_a_stream_that_stops_ends_the_movement_and_says_so_and_that_it_returned(
     heard = Heard(library).feed(take("CShape")[:-90])
     assert not heard.ended  # it moves still
     heard.wait(1.0)
-    assert heard.ended == ["CShape"]
+    assert not heard.ended  # its samples may come still, as a group
     heard.wait(2.0)
+    assert heard.ended == ["CShape"]
     assert [sentence.split(":")[0] for sentence in heard.told] == ["stream stopped"]
     heard.feed(take("CShape"))
     assert heard.ended == ["CShape", "CShape"]
@@ -110,6 +111,29 @@ def test_a_movement_begins_behind_the_gap_in_which_a_hand_was_gone(library):
     ended = [symbol for symbol in heard.symbols if symbol.is_over]
     assert [symbol.name for symbol in ended] == ["GShape", "Sine", "WShape"]
     assert all(symbol.start > begin for symbol, begin in zip(ended[1:], begins, strict=True))
+
+
+def test_samples_that_come_in_groups_are_taken_by_their_stamps(library):
+    """Each group was a movement of its own, and a gap within one a clock that jumped."""
+    heard = Heard(library)
+    rows = np.concatenate((take("GShape")[:-60], take("Sine")))
+    stamps = heard.stamp + np.arange(1, len(rows) + 1) / RATE
+    stamps[-len(take("Sine")) :] += 1.0
+    for came in np.arange(stamps[0] + 1.5, stamps[-1] + 3.0, 1.5):
+        for _ in range(29):
+            heard.clock += 0.05
+            heard.take(NOTHING)
+        heard.clock += 0.05
+        group = (stamps >= came - 1.5) & (stamps < came)
+        heard.take(Block(stamps[group], rows[group]))
+    assert heard.ended == ["GShape", "Sine"]
+    assert [sentence[:26] for sentence in heard.told] == ["gap: no samples for 1.0 s;"]
+
+
+def test_samples_without_stamps_of_their_own_end_a_movement_at_once(library):
+    heard = Heard(library)
+    heard.take(Block(heard.stamp + np.arange(400) / RATE, take("CShape")[:400], own_stamps=False))
+    assert heard.wait(0.7).ended
 
 
 @pytest.mark.parametrize("by", [-3600.0, -2.0, 900.0])

@@ -42,6 +42,7 @@ class Block(NamedTuple):
     times: Array  # (k,), stamps [s]
     rows: Array  # (k, m), the columns of the source
     notes: Sequence[tuple[str, str]] = ()
+    own_stamps: bool = True  # of when it was measured; else of when it came
 
 
 NOTHING = Block(np.empty(0), np.empty((0, 0)))
@@ -94,7 +95,8 @@ class Rests:
     size: float  # extent of a usual movement
     longest: float  # duration after which a movement ends although nothing rests [s]
     rest: float = 0.3  # a movement is over when nothing has moved for so long [s]
-    silence: float = 0.5  # or when no sample has come for so long [s]
+    silence: float = 0.5  # or when there is no sample for so long by the stamps [s]
+    patience: float = 2.0  # or none has come for so long, of samples with stamps of their own, which may come in groups
     sets_out: float = 0.08  # share of the size that is moved where a movement begins
     rests: float = 0.03  # and that is not moved where it ends
 
@@ -159,6 +161,8 @@ class Listener:
         self._answer: tuple[float, Answer] | None = None  # with its end, before it is sure that it is over
         self._stopped = False
         self._last_time, self._last_arrival = -math.inf, -math.inf
+        self._own_stamps = True
+        self._ahead = -math.inf  # the most that stamps have been ahead of the clock of arrivals [s]
 
     def note(self, kind: str, sentence: str) -> None:
         """Count a problem, and say it unless that kind was said just now; an empty kind is news, not counted."""
@@ -178,12 +182,15 @@ class Listener:
         times, rows = self._usable(block, columns or Columns((), ()))
         silent = arrival - self._last_arrival
         if not len(times):
-            if self._began is not None and silent > self.rests.silence:
+            patience = self.rests.patience if self._own_stamps else self.rests.silence
+            lost = float(block.times[-1]) - self._last_time if len(block.times) else 0.0  # samples that cannot be used
+            if self._began is not None and (silent > patience or lost > self.rests.silence):
                 yield from self._end(self._last_time, self._last_time)
             if not self._stopped and _STOPPED < silent < math.inf:
                 self._stopped = True
                 self.note("stream stopped", f"no samples for {silent:.1f} s; waiting for more")
             return
+        self._own_stamps = block.own_stamps
         if self._stopped:
             self._stopped = False
             self.note("stream returned", f"after {silent:.1f} s")
@@ -232,21 +239,24 @@ class Listener:
 
     def _follow(self, times: Array, rows: Array, arrival: float) -> Iterator[Symbol]:
         """Follow samples that can be used: one by one for the borders of movements, those between them at once."""
-        waited, self._last_arrival = arrival - self._last_arrival, arrival
+        self._last_arrival = arrival
+        if self._ahead == -math.inf:
+            self._ahead = float(times[-1]) - arrival
         for k, t in enumerate(times.tolist()):
             step = t - self._last_time
             if -self.rests.silence <= step <= 0.0:
                 self.note("not later", "samples that are not later than the one before are left out")
                 continue
-            if step < 0.0 or waited + self.rests.silence < step < math.inf:
+            if step < 0.0 or (self.rests.silence < step < math.inf and t - arrival > self._ahead + self.rests.silence):
                 self.note("clock jumped", f"by {step:+.3g} s; the movement under way is dropped")
                 self._forget()
+                self._ahead = t - arrival
             elif step > self.rests.silence:
                 if self._began is not None:
                     self.note("gap", f"no samples for {step:.1f} s; the movement under way ends before")
                     yield from self._end(self._last_time, t)
                 self._forget()  # else the way across the gap is motion, and a movement begins before it
-            self._last_time, waited = t, 0.0
+            self._last_time = t
             extent = self._remember(t, rows[k])
             if self._began is None:
                 if extent > self.rests.sets_out * self.rests.size:
@@ -264,6 +274,7 @@ class Listener:
             elif t - self._began > self.rests.longest:
                 self.note("no rest", f"a movement is cut after {self.rests.longest:.1f} s; does the sensor tremble?")
                 yield from self._end(t, t)
+        self._ahead = max(self._ahead, self._last_time - arrival)
         yield from self._update()
 
     def _rest(self) -> float:
