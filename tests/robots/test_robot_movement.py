@@ -199,6 +199,14 @@ def test_joints_in_what_is_no_angle_do_not_move(tmp_path, unit, message):
         move(one, robot, space="joints")
 
 
+def test_a_primitive_that_repeats_is_moved_as_its_rollout():
+    t = np.linspace(0, 6, 300)
+    path = np.column_stack((0.45 + 0 * t, 0.08 * np.cos(np.pi * t), 0.4 + 0.05 * np.sin(np.pi * t)))
+    primitive = kineme.RhythmicDMP().learn([kineme.Trajectory(times=t, positions=path)])
+    requests = [request_of(movement, load("panda"), "tip") for movement in (primitive, primitive.rollout())]
+    np.testing.assert_array_equal(requests[0].positions, requests[1].positions)
+
+
 @pytest.mark.parametrize(
     ("head", "asked", "goal"),
     [

@@ -8,13 +8,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import Roles, Scales, check_count, check_plausible, plane_of, roles_of, scales_of
+from kineme.robots.planning.roles import (
+    Roles,
+    Scales,
+    check_count,
+    check_plausible,
+    check_tip,
+    plane_of,
+    roles_of,
+    scales_of,
+)
 from kineme.units import split_head
 from kineme.validation import Array, as_point
 
@@ -51,12 +60,9 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     n = len(roles.positions)
-    if joints is None and n not in (2, 3):
-        raise TrajectoryError(
-            f"expected two or three positions of the tip, got {n} among {', '.join(learned.columns)}; choose columns, "
-            "or say that it is a movement of the joints (joints=True, --joints)"
-        )
-    if joints is not None:
+    if joints is None:
+        check_tip(roles)
+    else:
         check_count(roles, joints)
     scaled = None if scale is None else Scales(np.full(n, scale), np.zeros(n), ("",) * n)
     scales = scaled or scales_of(roles, joints, joint_units)

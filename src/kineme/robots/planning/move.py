@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.pose.pose_dmp import PosePrimitives
+from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz
@@ -26,6 +27,7 @@ from kineme.robots.planning.roles import (
     SPACES,
     check_count,
     check_plausible,
+    check_tip,
     plane_of,
     roles_of,
     scales_of,
@@ -255,7 +257,7 @@ def request_of(
     movement: Any, robot: Robot, space: str, steps: Any = None, continuous: Any = None, joint_units: str | None = None
 ) -> Request:
     """Read the arguments of `move` as one movement; `steps` and `continuous` besides such channels of its own."""
-    if isinstance(movement, Primitives | PosePrimitives):
+    if isinstance(movement, Primitives | PosePrimitives | RhythmicPrimitives):
         movement = movement.rollout()
     recording = as_recording(movement)
     times, columns = recording.times, np.asarray(recording.recorded, dtype=float)
@@ -263,6 +265,8 @@ def request_of(
     roles = roles_of(recording.channels, columns.shape[1], space, robot)
     if space == "joints":
         check_count(roles, robot)
+    else:
+        check_tip(roles)
     scales = scales_of(roles, robot if space == "joints" else None, joint_units)
     positions = columns[:, roles.positions] * scales.size + scales.offset
     if space == "joints":

@@ -16,6 +16,7 @@ from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.channels.detect import name_of
 from kineme.movements.rotations import NORM_TOLERANCE
 from kineme.movements.tables.time_stamps import words_of
+from kineme.reporting.text import first_names
 from kineme.robots.models.robot import Robot
 from kineme.units import split_head, unit_named
 from kineme.validation import Array
@@ -162,6 +163,22 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
             f"{remedy}"
         )
     return float(unit.size), 0.0
+
+
+def check_tip(roles: Roles) -> None:
+    """Refuse positions of the tip that are neither two nor three; that poses are joints is not advised."""
+    if (n := len(roles.positions)) in (2, 3):
+        return
+    names = [channel.name for channel in roles.columns]
+    words = {word for name in names for word in words_of(name_of(name))}
+    posed = {*_AXES} <= words or words & {"pose", "tcp", "tip"}
+    joints = "" if posed else ", or say that the columns are the joints (space='joints', --joints)"
+    among = f" among {first_names(names, 12)}" if names else ""
+    raise TrajectoryError(
+        f"expected a movement of the tip, of 2 or 3 dimensions, got {n}{among}; "
+        "choose the position (columns=, in the shell --columns), and give the orientation, as a rotation vector or "
+        f"angles, as a quaternion in columns qw, qx, qy, qz{joints}"
+    )
 
 
 def check_count(roles: Roles, robot: Robot) -> None:
