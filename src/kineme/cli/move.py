@@ -20,7 +20,7 @@ _FILES = {
         "A .csv, .npz, .json or .parquet file; - for the screen, as CSV.",
     ),
     "ros1": (None, (".bag",), "A .bag of ROS 1 with JointTrajectory and JointState."),
-    "ros2": (None, (".mcap", ""), "A .mcap, or a folder, of ROS 2 with the same."),
+    "ros2": (None, (".mcap", ""), "A .mcap, or a new folder, of ROS 2 with the same."),
     "action_goal": (None, (".yaml", ".yml", ".json"), "A .yaml or .json file for ros2 action send_goal."),
     "plot": (None, (".png", ".svg", ".pdf"), "Path and joints beside their limits: a .png, .svg or .pdf file."),
     "rerun": (None, (".rrd",), opts.RERUN),
