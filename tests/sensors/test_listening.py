@@ -178,6 +178,9 @@ def test_columns_are_found_by_names_units_or_as_chosen(tmp_path):
         assert by_name.ended == ["GShape"]
         chosen = Heard(library, choose=("b", "0")).feed(turned, Columns(("a", "c", "b"), ("m", None, "m")))
         assert chosen.ended == ["GShape"]
+        assert not by_name.told + chosen.told
+        silent = Heard(library).feed(turned, Columns(("y", "other", "x"), (None,) * 3))
+        assert silent.told == ["the stream says no units; taken as x [mm], y [mm], as in the library"]
         missing = Heard(library).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert "expected the column 'x" in missing.told[0]
         wrong = Heard(library, choose=("d",)).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))

@@ -19,6 +19,7 @@ from kineme.errors import KinemeError, TrajectoryError
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
+from kineme.movements.channels.detect import name_of
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.trajectories.labels import Label
 from kineme.recognition.answer import Answer, Certainty
@@ -153,6 +154,7 @@ class Listener:
         self._wanted = None if channels is None else columns_recorded(channels)
         self._width = n_dims if channels is None else len(recorded_names(channels))
         self._coordinates = None if channels is None else IncrementalCoordinates(channels)
+        self._connected: Columns | None = None  # of which it was said what is taken in which unit
         self._said: dict[str, float] = {}
         self._recent = np.empty((0, 1 + self._width + n_dims))  # of the last moments: stamp, row, coordinates
         self._began: float | None = None  # of the movement under way
@@ -235,7 +237,14 @@ class Listener:
             )
         if wanted is None:
             return rows
-        return columns_like(rows, columns if by_name else Columns(wanted.heads, units), wanted, known_units=False)
+        ours = columns if by_name else Columns(wanted.heads, units)
+        taken = columns_like(rows, ours, wanted, known_units=False)
+        if columns != self._connected:
+            self._connected, said = columns, dict(zip(ours.names, ours.units, strict=True))
+            columns_in = zip(wanted.heads, wanted.names, wanted.units, strict=True)
+            if unsaid := [f"{name_of(head)} [{unit}]" for head, name, unit in columns_in if unit and not said[name]]:
+                self.note("", f"the stream says no units; taken as {first_names(unsaid, 12)}, as in the library")
+        return taken
 
     def _follow(self, times: Array, rows: Array, arrival: float) -> Iterator[Symbol]:
         """Follow samples that can be used: one by one for the borders of movements, those between them at once."""
