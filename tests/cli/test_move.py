@@ -153,6 +153,13 @@ def test_a_file_of_another_kind_is_refused_before_anything_is_read(wave, option,
     assert f"expected {expected}" in result.output
 
 
+def test_a_folder_that_is_there_is_refused_with_what_to_do(wave):
+    (wave / "bag").mkdir()
+    result = run("wave.csv", "--robot", "no such arm", "--ros2", "bag", "--force")
+    assert result.exit_code == 2, result.output
+    assert "the folder bag is there, and no option writes over folders; choose another name" in result.output
+
+
 def test_an_arm_at_rest_elsewhere_turns_its_tip_as_there(wave):
     words = ("wave.csv", "--robot", "ur5e", "--slow-down", "-o")
     assert run(*words, "a.csv").exit_code == 0

@@ -392,6 +392,12 @@ def test_the_world_of_a_plan_is_as_the_plan_has_it(table):
         disturb(world, ["jar:gone@1"])
 
 
+def test_a_first_place_in_millimeters_is_refused_with_what_can_be_done_here(table):
+    with pytest.raises(SpecificationError, match=r"recordings in millimeters\? convert") as refused:
+        simulation_of(begin(table)[0], table[2], origin=(450.0, 0.0, 0.0))
+    assert "--scale" not in str(refused.value)
+
+
 def test_recordings_may_have_an_origin_of_their_own(table):
     library, _, robot = table
     plan, _ = begin(table)

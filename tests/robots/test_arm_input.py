@@ -13,10 +13,12 @@ import kineme
 from arm_samples import stroke
 from kineme import Demonstrations
 from kineme.cli import main
+from kineme.dmp.generation.generate import learn_one
 from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.movements import of_channels
 from kineme.robots import ArmController, InfeasibleError, InverseKinematics, load, move
+from kineme.robots.planning.generate_at import generate_at
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -87,11 +89,19 @@ def test_another_number_of_joints_or_dimensions_is_said(panda):
     rows = np.zeros((40, 6)) + np.linspace(0, 1, 40)[:, None]
     with pytest.raises(TrajectoryError, match="of 2 or 3 dimensions, got 5"):
         move(rows[:, :5], panda)
-    channels = tuple(Channel(name, "position", (name,), None) for name in ("x", "y", "z", "rx", "ry", "rz"))
     plain = Demonstrations.from_arrays([rows], times=[np.linspace(0, 3, 40)])
-    one = Demonstrations.of_movements(of_channels(plain.movements, channels))
-    with pytest.raises(TrajectoryError, match=r"got 6; .* quaternion .* are the joints \(space='joints', --joints\)"):
-        move(one, load("ur5e"))
+    for names, joints in (
+        ("x y z rx ry rz", False),
+        ("pose_0 pose_1 pose_2 pose_3 pose_4 pose_5", False),
+        ("a b c d e f", True),
+    ):
+        channels = tuple(Channel(name, "position", (name,), None) for name in names.split())
+        one = Demonstrations.of_movements(of_channels(plain.movements, channels))
+        with pytest.raises(TrajectoryError, match=r"got 6 among .* quaternion") as refused:
+            move(one, load("ur5e"))
+        with pytest.raises(TrajectoryError, match=r"got 6 among .* quaternion"):
+            generate_at(learn_one(one[0], kineme.DMP()))
+        assert joints == ("--joints" in str(refused.value))  # a rotation vector would be executed as joints
 
 
 @pytest.mark.parametrize(

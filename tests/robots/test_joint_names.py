@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -121,6 +122,26 @@ def test_the_joints_of_the_other_arm_are_refused(tmp_path):
             check_order(columns[::-1], robot)
         assert joints_among(columns + [head.format(name) for name in names["right"]], robot) == [4, 5, 6, 7]
     assert joints_among([f"j{k}" for k in range(4)], robot) == [0, 1, 2, 3]
+
+
+def test_words_of_the_other_side_are_refused():
+    """Of `r_joint1` or `R1` the side was lost among the words that all columns share."""
+    panda = load("panda")
+    named = replace(panda, joints=tuple(f"left_joint{k}" for k in range(1, 8)), tip="left_tcp")
+
+    def taken(head, robot):
+        names = [head.format(k) for k in range(1, 8)]
+        return roles_of(tuple(Channel(name, "angle", (name,)) for name in names), 7, "joints", robot).positions
+
+    heads = ["r_joint{}", "R{}", "right_arm_joint_{}", "rightJoint{} [deg]", "RARM_JOINT{}", "joint_{}_right",
+             "/right/joint_states.position_{}", "q_right_{}_l [rad]"]  # fmt: skip
+    for robot in (named, replace(panda, tip="left_tcp")):
+        for head in heads:
+            with pytest.raises(TrajectoryError, match=r"expected a recording of the left arm, as .*choose the tip"):
+                taken(head, robot)
+        for head in ("l_joint{}", "L{}", "q{}"):
+            assert taken(head, robot) == [*range(7)]
+    assert taken("r_joint{}", panda) == [*range(7)]
 
 
 def test_numbered_joints_of_another_arm_are_said():

@@ -213,6 +213,41 @@ def test_joints_without_a_unit_are_said_to_be_taken_as_radians(tmp_path):
             generated(learned)
 
 
+def test_a_primitive_that_repeats_is_moved_as_its_rollout():
+    t = np.linspace(0, 6, 300)
+    path = np.column_stack((0.45 + 0 * t, 0.08 * np.cos(np.pi * t), 0.4 + 0.05 * np.sin(np.pi * t)))
+    primitive = kineme.RhythmicDMP().learn([kineme.Trajectory(times=t, positions=path)])
+    requests = [request_of(movement, load("panda"), "tip") for movement in (primitive, primitive.rollout())]
+    np.testing.assert_array_equal(requests[0].positions, requests[1].positions)
+
+
+@pytest.mark.parametrize(
+    ("head", "asked", "goal"),
+    [
+        ("{} [deg]", {}, [10, -70, 60, -80, -85, 90]),
+        ("{}", {"joint_units": "deg"}, [10, -70, 60, -80, -85, 90]),
+        ("{} [rad]", {}, [0.2, -1.2, 1.0, -1.4, -1.5, 1.6]),
+    ],
+)
+def test_start_and_goal_of_joints_are_in_the_units_and_the_order_of_the_columns(tmp_path, head, asked, goal):
+    """A goal in degrees was taken as radians, and one in the order of a sorted file as in that of the arm."""
+    robot, size = load("ur5e"), 1.0 if "rad" in head else np.degrees(1)
+    order = sorted(range(6), key=robot.joints.__getitem__)  # as /joint_states has it
+    u = np.linspace(0, 1, 40)
+    rows = np.column_stack((3 * u, size * (robot.rest + 0.3 * (u**2 * (3 - 2 * u))[:, None])[:, order]))
+    heads = ["time", *(head.format(robot.joints[k]) for k in order)]
+    learned = learn_one(recorded(heads, rows, tmp_path), kineme.DMP())
+    made = generate_at(learned, rows[0, 1:], np.array(goal)[order], joints=robot, **asked)
+    np.testing.assert_allclose(made.movement.positions[-1], np.array(goal) / size, atol=1e-6)
+    np.testing.assert_allclose(made.movement.positions[0], robot.rest, atol=1e-6)
+    unit = "rad" if "rad" in head else "deg"
+    assert made.said[1].startswith(
+        f"goal is elbow_joint [{unit}] {goal[2]:g}, shoulder_lift_joint [{unit}] {goal[1]:g}"
+    )
+    with pytest.raises(TrajectoryError, match=rf"goal is in the units of the columns, elbow_joint \[{unit}\].*convert"):
+        generate_at(learned, None, [9999.0] * 6, joints=robot, **asked)
+
+
 def test_a_tip_in_what_is_no_length_moves_by_the_scale_alone(tmp_path):
     u = np.linspace(0, 1, 60)[:, None]
     one = recorded(["time", "x [px]", "y [px]", "z [px]"], np.hstack((3 * u, 100 * u, 50 * u**2, 20 * u**3)), tmp_path)

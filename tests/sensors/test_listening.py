@@ -81,13 +81,14 @@ def test_start_and_end_are_those_of_the_motion_and_the_decision_comes_a_rest_lat
 
 
 def test_a_stream_that_stops_ends_the_movement_and_says_so_and_that_it_returned(library):
-    heard = Heard(library).feed(take("CShape")[:-90])
+    heard = Heard(library).feed(take("CShape")[:-90], block=5)
     assert not heard.ended  # it moves still
     heard.wait(1.0)
-    assert heard.ended == ["CShape"]
+    assert not heard.ended  # its samples may come still, as a group
     heard.wait(2.0)
+    assert heard.ended == ["CShape"]
     assert [sentence.split(":")[0] for sentence in heard.told] == ["stream stopped"]
-    heard.feed(take("CShape"))
+    heard.feed(take("CShape"), block=5)
     assert heard.ended == ["CShape", "CShape"]
     assert heard.told[1].startswith("stream returned: after 3.0")
 
@@ -98,6 +99,41 @@ def test_a_gap_ends_the_movement_before_it(library):
     heard.feed(take("Sine"))
     assert heard.ended == ["GShape", "Sine"]
     assert any(sentence.startswith("gap: no samples for 3.0 s") for sentence in heard.told)
+
+
+def test_a_movement_begins_behind_the_gap_in_which_a_hand_was_gone(library):
+    """The way across the gap, while nothing was under way, was taken for the first motion."""
+    heard, begins = Heard(library).feed(take("GShape")), []
+    for name in ("Sine", "WShape"):
+        heard.wait(1.5)
+        begins.append(heard.stamp)
+        heard.feed(take(name)[60:])
+    ended = [symbol for symbol in heard.symbols if symbol.is_over]
+    assert [symbol.name for symbol in ended] == ["GShape", "Sine", "WShape"]
+    assert all(symbol.start > begin for symbol, begin in zip(ended[1:], begins, strict=True))
+
+
+def test_samples_that_come_in_groups_are_taken_by_their_stamps(library):
+    """Each group was a movement of its own, and a gap within one a clock that jumped."""
+    heard = Heard(library)
+    rows = np.concatenate((take("GShape")[:-60], take("Sine")))
+    stamps = heard.stamp + np.arange(1, len(rows) + 1) / RATE
+    stamps[-len(take("Sine")) :] += 1.0
+    for came in np.arange(stamps[0] + 1.5, stamps[-1] + 3.0, 1.5):
+        for _ in range(29):
+            heard.clock += 0.05
+            heard.take(NOTHING)
+        heard.clock += 0.05
+        group = (stamps >= came - 1.5) & (stamps < came)
+        heard.take(Block(stamps[group], rows[group]))
+    assert heard.ended == ["GShape", "Sine"]
+    assert [sentence[:26] for sentence in heard.told] == ["gap: no samples for 1.0 s;"]
+
+
+def test_samples_without_stamps_of_their_own_end_a_movement_at_once(library):
+    heard = Heard(library)
+    heard.take(Block(heard.stamp + np.arange(400) / RATE, take("CShape")[:400], own_stamps=False))
+    assert heard.wait(0.7).ended
 
 
 @pytest.mark.parametrize("by", [-3600.0, -2.0, 900.0])
@@ -123,7 +159,7 @@ def test_samples_that_cannot_be_used_are_left_out_counted_and_said_once(library)
 
 
 def test_only_nan_under_way_is_silence(library):
-    heard = Heard(library).feed(take("CShape")[:-90]).feed(np.full((100, 2), np.nan))
+    heard = Heard(library).feed(take("CShape")[:-90], block=5).feed(np.full((100, 2), np.nan))
     assert heard.ended == ["CShape"]
 
 
@@ -142,6 +178,9 @@ def test_columns_are_found_by_names_units_or_as_chosen(tmp_path):
         assert by_name.ended == ["GShape"]
         chosen = Heard(library, choose=("b", "0")).feed(turned, Columns(("a", "c", "b"), ("m", None, "m")))
         assert chosen.ended == ["GShape"]
+        assert not by_name.told + chosen.told
+        silent = Heard(library).feed(turned, Columns(("y", "other", "x"), (None,) * 3))
+        assert silent.told == ["the stream says no units; taken as x [mm], y [mm], as in the library"]
         missing = Heard(library).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert "expected the column 'x" in missing.told[0]
         wrong = Heard(library, choose=("d",)).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))

@@ -71,7 +71,7 @@ def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, 
 def test_what_to_do_about_a_refusal_is_there_in_the_studio(client, symbol, arms):
     large = _move(client, symbol, size=3.0).json()["error"]
     assert large.endswith("m away; make the movement smaller")
-    for text in (reach._REMEDY, refusal._ELSEWHERE, refusal.OTHER_JOINTS):
+    for text in (reach._REMEDY, reach._MILLIMETERS, refusal._ELSEWHERE, refusal.OTHER_JOINTS):
         assert "--" not in in_studio_words(text)
 
 
@@ -82,7 +82,7 @@ def test_an_arm_that_has_nowhere_to_go_says_which_movements_it_needs(open_studio
         library.learn([Trajectory(t, np.tile(x, 2)[:, :d])], ["other"])
     other = open_studio(tmp_path / "other")
     refused = _move(other, other.get("/api/library").json()["symbols"][0]["id"]).json()["error"]
-    assert f"got {d} among" in refused
+    assert f"of 2 or 3 dimensions, got {d}; make a library" in refused
     assert "make a library of movements in the plane or in space" in refused
 
 

@@ -35,7 +35,7 @@ _SIMULATED = ("disturb", "noise", "seed", "replans", "planner", "stop_at_each_st
 @click.option("--stop-at-each-step", is_flag=True, help="Stand after each step, also where the next may go on.")
 @opts.heading("Output")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A .json file for the report; without --simulate "
-              "a new folder for it and the joints of each step, in CSV.")  # fmt: skip
+              "a new folder, also with --force, for it and the joints of each step, in CSV.")  # fmt: skip
 @click.option("--plot", type=opts.FILE, help="Where the tip and the objects went: a .png, .svg or .pdf file.")
 @click.option("--view", type=opts.FILE, help="The arm as it moves: a .gif file.")
 @opts.json_option

@@ -10,6 +10,7 @@ import click
 from kineme.cli import options as opts
 from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options, name_of_source, read_source
+from kineme.reporting.text import printable
 
 #: Option -> its short name if it has one, endings of its files, what it says about itself.
 _FILES = {
@@ -19,7 +20,7 @@ _FILES = {
         "A .csv, .npz, .json or .parquet file; - for the screen, as CSV.",
     ),
     "ros1": (None, (".bag",), "A .bag of ROS 1 with JointTrajectory and JointState."),
-    "ros2": (None, (".mcap", ""), "A .mcap, or a folder, of ROS 2 with the same."),
+    "ros2": (None, (".mcap", ""), "A .mcap, or a new folder, of ROS 2 with the same."),
     "action_goal": (None, (".yaml", ".yml", ".json"), "A .yaml or .json file for ros2 action send_goal."),
     "plot": (None, (".png", ".svg", ".pdf"), "Path and joints beside their limits: a .png, .svg or .pdf file."),
     "rerun": (None, (".rrd",), opts.RERUN),
@@ -84,9 +85,14 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
 @opts.heading("Arm")
 @click.option("--robot", required=True, help="panda, ur5e, wam, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
-@click.option("--from", "start", type=opts.NUMBERS, help="Where the joints stand now.  [default: the rest posture]")
-@click.option("--rest", type=opts.NUMBERS, help="Joints at rest.  [default: of the model, of a file near mid-range]")
-@click.option("--at", type=opts.NUMBERS, help="Start in the frame of the robot.  [default: where the arm does it best]")
+@click.option(
+    "--from", "start", type=opts.NUMBERS, help="Where the joints stand now [rad].  [default: the rest posture]"
+)
+@click.option("--rest", type=opts.NUMBERS,
+              help="Joints at rest [rad].  [default: of the model, of a file near mid-range]")  # fmt: skip
+@click.option("--at", type=opts.NUMBERS,
+              help="Start of the tip in the frame of the robot [m], or of joints, in the units and the order of their "
+              "columns.  [default: where the arm does it best, joints as demonstrated]")  # fmt: skip
 @click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
 @click.option("--scale", type=opts.Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
 @click.option("--plane", type=click.Choice(["xy", "xz", "yz"]),
@@ -103,7 +109,7 @@ def write_files(movement: Any, options: dict[str, Any]) -> None:
 @click.option("--max-velocity", type=opts.Finite(), help="Of every joint, below what the model allows.")
 @click.option("--max-acceleration", type=opts.Finite(), help="The same for accelerations.")
 @opts.heading("Movement")
-@click.option("--goal", type=opts.NUMBERS, help="End in the frame of the robot.  [default: as demonstrated]")
+@click.option("--goal", type=opts.NUMBERS, help="End, as --at.  [default: as demonstrated]")
 @click.option("--duration", type=opts.Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--slow-down", is_flag=True, help="Slow the movement down as far as limits demand.")
 @click.option("--fastest", is_flag=True, help="Pass the path in the least time that the limits allow.")
@@ -193,6 +199,8 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         )
     chosen = {name: options[name] for name in ("goal", "duration", "scale", "rate", "joint_units", "plane")}
     generated = generate_at(learned, options["at"], joints=robot if space == "joints" else None, **chosen)
+    for sentence in generated.said:
+        write(f"note: --{printable(sentence)}", err=True)
     is_placed = options["at"] or options["as_recorded"] or space == "joints"
     return move_robot(
         generated.movement,

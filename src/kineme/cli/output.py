@@ -51,7 +51,10 @@ def check_new(
             expected = ", ".join(ending or "a folder" for ending in endings)
             raise click.BadParameter(f"expected {expected}, got {path.suffix or 'no ending'}", param_hint=flag)
         if path.is_dir():
-            raise click.UsageError(f"expected a new file or folder to write, {printable(path)} is there")
+            raise click.UsageError(
+                f"expected a new file or folder to write, the folder {printable(path)} is there, and no option writes "
+                "over folders; choose another name, or remove it"
+            )
         if not path.absolute().parent.is_dir():
             raise click.UsageError(f"expected a folder to write {printable(path)} into, there is none; create it")
     if not path.exists():

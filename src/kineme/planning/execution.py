@@ -47,6 +47,9 @@ _CORNER = 0.5  # of the radius of a place, by which steps that are joined miss i
 _ELSEWHERE = re.compile(r"choose another (?:place|goal) \(--\w+\).{0,80}?(?:\(--scale\)|\(--rest\)|of the joints)")
 _HERE = "choose another origin of the recordings (--origin), other places, or a freer orientation (--follow)"
 
+_MILLIMETERS = re.compile(r"is it in millimeters\? .{0,40} --scale 0\.001 makes a movement so")
+_METERS = "are the recordings in millimeters? convert them to meters, and learn library and operators again"
+
 
 class World(Protocol):
     """An arm and its sensors, as `kineme.robots.Simulation`."""
@@ -227,7 +230,7 @@ def check_steps(
             start = joints if movements else None
             movements.append(_movement(plan.problem, step, library, robot, start, (frame, follow)))
         except KinemeError as error:
-            attempts.append(Attempt(str(step), "planned", "refused", (_refusal(error),), 0))
+            attempts.append(Attempt(str(step), "planned", "refused", (refusal(error),), 0))
             break
         joints = movements[-1].trajectory.positions[-1]
         attempts.append(Attempt(str(step), "planned", "checked", (), 0, movements[-1].trajectory.duration))
@@ -396,7 +399,7 @@ class _Executor:
                 parts = [part.at(shift, movement.factor) for part in stop.parts]
         except KinemeError as error:
             step = (self.left if stop is None else [part.step for part in stop.parts])[0]
-            self.attempts.append(Attempt(str(step), how, "refused", (_refusal(error),), len(self.replans)))
+            self.attempts.append(Attempt(str(step), how, "refused", (refusal(error),), len(self.replans)))
             return None
         stop = self.move(how, movement, parts)
         del self.left[: len(parts) - (len(stop.parts) if stop else 0)]
@@ -522,11 +525,11 @@ class _Executor:
         try:
             movement = self.in_joints(even / _SHARE, joints)
         except KinemeError as error:
-            self.attempts.append(Attempt("(back)", "back", "refused", (_refusal(error),), len(self.replans)))
+            self.attempts.append(Attempt("(back)", "back", "refused", (refusal(error),), len(self.replans)))
             return False
         return self.move("back", movement) is None
 
 
-def _refusal(error: KinemeError) -> str:
+def refusal(error: KinemeError) -> str:
     """Return the words of an error with the options that there are here: the place is given by the plan."""
-    return _ELSEWHERE.sub(_HERE, str(error))
+    return _MILLIMETERS.sub(_METERS, _ELSEWHERE.sub(_HERE, str(error)))

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.planning.execution import refusal
 from kineme.planning.plan import Plan, Step
 from kineme.planning.problem import facts_after
 from kineme.planning.under_way import frame_of
@@ -43,7 +44,10 @@ def simulation_of(
     if plan.steps and plan.steps[0].start:
         ik, position = InverseKinematics(robot, follow), frame.to_robot(np.array(plan.steps[0].start))
         what = f"the place where the plan begins, {point_in_words(position)} m"
-        reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
+        try:
+            reached = reaching_postures(robot, position, ik.tip_rotation, ik.costs, what)
+        except TrajectoryError as error:
+            raise SpecificationError(refusal(error)) from None
         joints = reached[int(np.argmin(np.abs(reached - joints).max(axis=1)))]  # the nearest, turned as at rest
     held = [fact[1] for fact, value in problem.facts.items() if value and fact[0] == "holding"]
     tip = Simulation(robot, start=joints).state()

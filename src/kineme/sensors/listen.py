@@ -19,6 +19,7 @@ from kineme.errors import KinemeError, TrajectoryError
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
+from kineme.movements.channels.detect import name_of
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.trajectories.labels import Label
 from kineme.recognition.answer import Answer, Certainty
@@ -42,6 +43,7 @@ class Block(NamedTuple):
     times: Array  # (k,), stamps [s]
     rows: Array  # (k, m), the columns of the source
     notes: Sequence[tuple[str, str]] = ()
+    own_stamps: bool = True  # of when it was measured; else of when it came
 
 
 NOTHING = Block(np.empty(0), np.empty((0, 0)))
@@ -94,7 +96,8 @@ class Rests:
     size: float  # extent of a usual movement
     longest: float  # duration after which a movement ends although nothing rests [s]
     rest: float = 0.3  # a movement is over when nothing has moved for so long [s]
-    silence: float = 0.5  # or when no sample has come for so long [s]
+    silence: float = 0.5  # or when there is no sample for so long by the stamps [s]
+    patience: float = 2.0  # or none has come for so long, of samples with stamps of their own, which may come in groups
     sets_out: float = 0.08  # share of the size that is moved where a movement begins
     rests: float = 0.03  # and that is not moved where it ends
 
@@ -151,6 +154,7 @@ class Listener:
         self._wanted = None if channels is None else columns_recorded(channels)
         self._width = n_dims if channels is None else len(recorded_names(channels))
         self._coordinates = None if channels is None else IncrementalCoordinates(channels)
+        self._connected: Columns | None = None  # of which it was said what is taken in which unit
         self._said: dict[str, float] = {}
         self._recent = np.empty((0, 1 + self._width + n_dims))  # of the last moments: stamp, row, coordinates
         self._began: float | None = None  # of the movement under way
@@ -159,6 +163,8 @@ class Listener:
         self._answer: tuple[float, Answer] | None = None  # with its end, before it is sure that it is over
         self._stopped = False
         self._last_time, self._last_arrival = -math.inf, -math.inf
+        self._own_stamps = True
+        self._ahead = -math.inf  # the most that stamps have been ahead of the clock of arrivals [s]
 
     def note(self, kind: str, sentence: str) -> None:
         """Count a problem, and say it unless that kind was said just now; an empty kind is news, not counted."""
@@ -178,12 +184,15 @@ class Listener:
         times, rows = self._usable(block, columns or Columns((), ()))
         silent = arrival - self._last_arrival
         if not len(times):
-            if self._began is not None and silent > self.rests.silence:
+            patience = self.rests.patience if self._own_stamps else self.rests.silence
+            lost = float(block.times[-1]) - self._last_time if len(block.times) else 0.0  # samples that cannot be used
+            if self._began is not None and (silent > patience or lost > self.rests.silence):
                 yield from self._end(self._last_time, self._last_time)
             if not self._stopped and _STOPPED < silent < math.inf:
                 self._stopped = True
                 self.note("stream stopped", f"no samples for {silent:.1f} s; waiting for more")
             return
+        self._own_stamps = block.own_stamps
         if self._stopped:
             self._stopped = False
             self.note("stream returned", f"after {silent:.1f} s")
@@ -228,23 +237,35 @@ class Listener:
             )
         if wanted is None:
             return rows
-        return columns_like(rows, columns if by_name else Columns(wanted.heads, units), wanted, known_units=False)
+        ours = columns if by_name else Columns(wanted.heads, units)
+        taken = columns_like(rows, ours, wanted, known_units=False)
+        if columns != self._connected:
+            self._connected, said = columns, dict(zip(ours.names, ours.units, strict=True))
+            columns_in = zip(wanted.heads, wanted.names, wanted.units, strict=True)
+            if unsaid := [f"{name_of(head)} [{unit}]" for head, name, unit in columns_in if unit and not said[name]]:
+                self.note("", f"the stream says no units; taken as {first_names(unsaid, 12)}, as in the library")
+        return taken
 
     def _follow(self, times: Array, rows: Array, arrival: float) -> Iterator[Symbol]:
         """Follow samples that can be used: one by one for the borders of movements, those between them at once."""
-        waited, self._last_arrival = arrival - self._last_arrival, arrival
+        self._last_arrival = arrival
+        if self._ahead == -math.inf:
+            self._ahead = float(times[-1]) - arrival
         for k, t in enumerate(times.tolist()):
             step = t - self._last_time
             if -self.rests.silence <= step <= 0.0:
                 self.note("not later", "samples that are not later than the one before are left out")
                 continue
-            if step < 0.0 or waited + self.rests.silence < step < math.inf:
+            if step < 0.0 or (self.rests.silence < step < math.inf and t - arrival > self._ahead + self.rests.silence):
                 self.note("clock jumped", f"by {step:+.3g} s; the movement under way is dropped")
                 self._forget()
-            elif step > self.rests.silence and self._began is not None:
-                self.note("gap", f"no samples for {step:.1f} s; the movement under way ends before")
-                yield from self._end(self._last_time, t)
-            self._last_time, waited = t, 0.0
+                self._ahead = t - arrival
+            elif step > self.rests.silence:
+                if self._began is not None:
+                    self.note("gap", f"no samples for {step:.1f} s; the movement under way ends before")
+                    yield from self._end(self._last_time, t)
+                self._forget()  # else the way across the gap is motion, and a movement begins before it
+            self._last_time = t
             extent = self._remember(t, rows[k])
             if self._began is None:
                 if extent > self.rests.sets_out * self.rests.size:
@@ -262,6 +283,7 @@ class Listener:
             elif t - self._began > self.rests.longest:
                 self.note("no rest", f"a movement is cut after {self.rests.longest:.1f} s; does the sensor tremble?")
                 yield from self._end(t, t)
+        self._ahead = max(self._ahead, self._last_time - arrival)
         yield from self._update()
 
     def _rest(self) -> float:

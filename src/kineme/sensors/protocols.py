@@ -175,7 +175,9 @@ class OscSource:
                         rows.append(row)
                 except Exception:  # whatever a parser raises on hostile bytes
                     notes.append(("no OSC", f"a datagram of {len(datagram):,} bytes is left out"))
-        return Block(np.array(times), np.array(rows), notes) if rows else NOTHING._replace(notes=notes)
+        if not rows:
+            return NOTHING._replace(notes=notes)
+        return Block(np.array(times), np.array(rows), notes, own_stamps=self._stamped)
 
     def _rows(self, datagram: bytes, notes: list[tuple[str, str]]) -> Iterator[list[float]]:
         """Yield the numbers of each message to the address, as many as in the first one."""

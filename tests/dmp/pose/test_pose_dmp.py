@@ -222,7 +222,7 @@ def test_wrong_specifications_are_refused():
         PoseDMP("original")
     scaled = PoseDMP(kineme.DMP("amplitude-scaled"))
     with pytest.raises(
-        SpecificationError, match=r'for poses, got "amplitude-scaled".* learn positions and orientations'
+        SpecificationError, match=r'"decoupled" for poses, got "amplitude-scaled".* learn positions and orientations'
     ):
         scaled.learn([carry(0)])
     assert len(scaled.learn([tumble(0)])) == 1

@@ -13,6 +13,7 @@ from kineme.dmp.control.plan import ObstacleAvoidance, Options
 from kineme.dmp.discrete.dmp import DMP, Primitives
 from kineme.dmp.discrete.modulate import modulated, plan_along
 from kineme.dmp.discrete.rollout import Rollout, rollout, sampled
+from kineme.dmp.discrete.specification import FORMULATIONS
 from kineme.dmp.discrete.via_points import ViaLike, broadcast_length
 from kineme.dmp.pose.pose_controller import PoseController
 from kineme.dmp.pose.pose_rollout import PoseRollout, changes_in_tangent, checked_poses, rates_in_tangent
@@ -99,8 +100,9 @@ class PoseDMP:
         recorded = Demonstrations.of(movements)
         tangent, references = to_tangent(recorded, self.dmp.preprocessing)
         if self.dmp.formulation == "amplitude-scaled" and tangent.n_dims > 3:
+            others = ", ".join(f'"{name}"' for name in FORMULATIONS if name != self.dmp.formulation)
             raise SpecificationError(
-                'expected the formulation "bio-inspired" or "original" for poses, got "amplitude-scaled", which scales '
+                f'expected one of the formulations {others} for poses, got "amplitude-scaled", which scales '
                 "by one distance over meters and radians; learn positions and orientations apart to use it"
             )
         about = recorded_as(recorded, self.dmp.preprocessing)

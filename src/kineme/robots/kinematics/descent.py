@@ -33,6 +33,7 @@ _FAR = 3.0  # from an arm [m]: farther than that, it is rather the unit that is 
 _REMEDY = (
     "choose another place (--at), free the orientation (follow=, --follow axis), or make the movement smaller (--scale)"
 )
+_MILLIMETERS = "is it in millimeters? --at and --goal are in meters, --scale 0.001 makes a movement so"
 
 #: Planes in which a two-dimensional movement is executed: its axes in the frame of the robot.
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -183,11 +184,6 @@ def task_path(
 ) -> TaskPath:
     """Positions (T, 2), in a plane through a point, or (T, 3), and quaternions w, x, y, z, one or (T, 4), as poses."""
     d = positions.shape[1]
-    if d not in (2, 3):
-        raise TrajectoryError(
-            f"expected a movement of the tip, of 2 or 3 dimensions, got {d}; give its orientation as a quaternion in "
-            "columns qw, qx, qy, qz, or say that the columns are the joints (space='joints', --joints)"
-        )
     if plane not in PLANES:
         raise SpecificationError(f"expected plane as one of {', '.join(PLANES)}, got {plane!r}")
     points = np.tile(np.zeros(3) if through is None else as_numbers(through, "through"), (len(times), 1))
@@ -242,7 +238,7 @@ def point_in_words(position: Array) -> str:
 
 
 def _unreachable(robot: Robot, what: str, distance: float) -> str:
-    remedy = "is the movement in millimeters? --scale 0.001 makes it meters" if distance > _FAR else _REMEDY
+    remedy = _MILLIMETERS if distance > _FAR else _REMEDY
     return f"{robot.name} does not reach {what}: its tip stays {distance:.3f} m away; {remedy}"
 
 

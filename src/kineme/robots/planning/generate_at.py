@@ -9,14 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.dmp.generation.generate import Learned, MovementOptions, generate
-from kineme.errors import SpecificationError, TrajectoryError, warn
+from kineme.errors import SpecificationError, warn
 from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.robots.execution.preflight import TRACKED
 from kineme.robots.kinematics.descent import PLANES
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import DRIVERS, Scales, plane_of, roles_of, scales_of
+from kineme.robots.planning.roles import (
+    DRIVERS,
+    Roles,
+    Scales,
+    check_count,
+    check_plausible,
+    check_tip,
+    plane_of,
+    roles_of,
+    scales_of,
+)
+from kineme.units import split_head
 from kineme.validation import Array, as_point
 
 
@@ -27,6 +38,7 @@ class GeneratedMovement(NamedTuple):
     steps: dict[str, Array]  # name -> (T,)
     continuous: dict[str, Array]  # the same of what moves beside joints, as a gripper
     plane: str  # of two positions
+    said: list[str]  # start and goal of joints as they were taken, with names and units
 
 
 def generate_at(  # noqa: PLR0913 - one parameter per option
@@ -44,19 +56,24 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
 ) -> GeneratedMovement:
     """Generate a movement of the tip, or of the `joints` of an arm, with start and goal in the frame of the robot.
 
-    `at` and `goal` (3,) or, of the joints, (n,) are in meters and radians, by default as demonstrated; `displacement`
-    (n,) is goal minus start in the unit of the recording. `scale` is meters or radians for one of these units, by
-    default as heads of columns say it, else 1. `joint_units` and `plane` are as of `move`, `rate` is the least [1/s].
+    `at` and `goal` (3,) are in meters or, of the joints, (n,) in the units and the order of their columns, by default
+    as demonstrated; `displacement` (n,) is goal minus start in the unit of the recording. `scale` is meters or radians
+    for one of these units, by default as heads of columns say it, else 1. `joint_units` and `plane` are as of `move`,
+    `rate` is the least [1/s].
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     n = len(roles.positions)
-    if joints is None and n not in (2, 3):
-        raise TrajectoryError(
-            f"expected two or three positions of the tip, got {n} among {', '.join(learned.columns)}; choose columns, "
-            "or say that it is a movement of the joints (joints=True, --joints)"
-        )
-    frame = joints.joints if joints else "xyz"
-    begin, end = (None if p is None else as_point(name, p, frame) for name, p in (("at", at), ("goal", goal)))
+    if joints is None:
+        check_tip(roles)
+    else:
+        check_count(roles, joints)
+    scaled = None if scale is None else Scales(np.full(n, scale), np.zeros(n), ("",) * n)
+    scales = scaled or scales_of(roles, joints, joint_units)
+    said: list[str] = []
+    begin, end = (
+        None if p is None else _joints(name, p, joints, roles, scales, said) if joints else as_point(name, p, "xyz")
+        for name, p in (("at", at), ("goal", goal))
+    )
     plane = plane_of(() if joints else roles.columns, plane)
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     if begin is not None and end is not None and len(axes) < len(end):
@@ -69,7 +86,6 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
             )
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
-    scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
     if joints is not None and scale is None and joint_units is None:
         _say_radians(roles.columns, joints)
     origin = start * scales.size + scales.offset if begin is None else begin[axes]
@@ -96,7 +112,21 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         {name: recorded[:, column] for name, column in columns.items()}
         for columns in (roles.discrete, roles.continuous)
     )
-    return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous, plane)
+    return GeneratedMovement(Trajectory(times=generated["times"], positions=moved), steps, continuous, plane, said)
+
+
+def _joints(name: str, point: ArrayLike, robot: Robot, roles: Roles, scales: Scales, said: list[str]) -> Array:
+    """Return a start or goal in the order and the units of the columns as joints [rad, m], and say what it is."""
+    order = np.argsort(roles.positions)
+    names = [split_head(channel.name)[0] for channel in roles.columns] or robot.joints
+    heads = [f"{names[k]} [{scales.units[k]}]" if scales.units[k] else names[k] for k in order]
+    values = as_point(name, point, heads)
+    said.append(f"{name} is {', '.join(f'{head} {value:g}' for head, value in zip(heads, values, strict=True))}")
+    joints = values[np.argsort(order)] * scales.size + scales.offset
+    units = f"{name} is in the units of the columns, {', '.join(heads)}"
+    remedy = "convert it, or say joint_units= of columns that say none, in the shell --joint-units"
+    check_plausible(joints[None], robot, f"{units}; {remedy}")
+    return joints
 
 
 def _say_radians(columns: Sequence[Channel], robot: Robot) -> None:

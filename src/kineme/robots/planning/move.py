@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from kineme.dmp.discrete.dmp import Primitives
 from kineme.dmp.pose.pose_dmp import PosePrimitives
+from kineme.dmp.rhythmic.rhythmic_dmp import RhythmicPrimitives
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz
@@ -21,7 +22,17 @@ from kineme.robots.kinematics import descent
 from kineme.robots.kinematics.pursuit import choose_place, choose_posture, pursue
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.planning import robot_movement
-from kineme.robots.planning.roles import JOINT_UNITS, SPACES, check_plausible, plane_of, roles_of, scales_of, space_of
+from kineme.robots.planning.roles import (
+    JOINT_UNITS,
+    SPACES,
+    check_count,
+    check_plausible,
+    check_tip,
+    plane_of,
+    roles_of,
+    scales_of,
+    space_of,
+)
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 PLACES = ("as given", "free")
@@ -80,7 +91,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     rate : float, default 100
         Samples per second of what is sent, 1 to 10,000.
     start : array_like of shape (n,), optional
-        Where the joints stand now; by default the rest posture. The approach begins there.
+        Where the joints stand now, in radians and meters; by default the rest posture. The approach begins there.
     steps : dict of str to array_like of shape (T,), optional
         Discrete channels, as of a gripper, at the samples of the movement: kept as steps, whatever the timing.
     continuous : dict of str to array_like of shape (T,), optional
@@ -246,17 +257,16 @@ def request_of(
     movement: Any, robot: Robot, space: str, steps: Any = None, continuous: Any = None, joint_units: str | None = None
 ) -> Request:
     """Read the arguments of `move` as one movement; `steps` and `continuous` besides such channels of its own."""
-    if isinstance(movement, Primitives | PosePrimitives):
+    if isinstance(movement, Primitives | PosePrimitives | RhythmicPrimitives):
         movement = movement.rollout()
     recording = as_recording(movement)
     times, columns = recording.times, np.asarray(recording.recorded, dtype=float)
     space = space_of(recording.channels, columns, robot) if space == "auto" else space
     roles = roles_of(recording.channels, columns.shape[1], space, robot)
-    if space == "joints" and len(roles.positions) != robot.n_joints:
-        raise TrajectoryError(
-            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
-            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
-        )
+    if space == "joints":
+        check_count(roles, robot)
+    else:
+        check_tip(roles)
     scales = scales_of(roles, robot if space == "joints" else None, joint_units)
     positions = columns[:, roles.positions] * scales.size + scales.offset
     if space == "joints":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from math import tau
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.channels.detect import name_of
 from kineme.movements.rotations import NORM_TOLERANCE
 from kineme.movements.tables.time_stamps import words_of
+from kineme.reporting.text import first_names
 from kineme.robots.models.robot import Robot
 from kineme.units import split_head, unit_named
 from kineme.validation import Array
@@ -24,6 +26,7 @@ DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
 _RATES = {"velocity", "velocities", "vel", "acceleration", "accelerations", "acc", "effort", "torque", "current"}
 _AXES = "xyz"
 _SIDES = ("left", "right")  # what names of two arms begin with
+_SIDE = re.compile("(left|right|l|r)(?:arm|joint)?")  # a word of a name that says of which arm it is
 _Words = tuple[str, ...]
 
 SPACES = ("auto", "tip", "joints")
@@ -49,6 +52,7 @@ class Scales(NamedTuple):
 
     size: Array  # (n,)
     offset: Array  # (n,)
+    units: tuple[str, ...]  # of the recorded positions; "" if a caller gave the size alone
 
 
 def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot | None = None) -> Roles:
@@ -83,11 +87,13 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
     continuous = {}
     if joints is not None:
         if robot is not None and not are_unknown(channels):
+            _check_sides([names[k] for k in joints], robot)
             _warn_of_other_names([names[k] for k in joints], robot)
         continuous = {channel.name: column for k, (channel, column) in enumerate(along) if k not in joints}
         along = [along[k] for k in joints]
     elif robot is not None and space == "joints" and len(along) == robot.n_joints:
         check_order(names, robot)
+        _check_sides(names, robot)
     elif space == "tip" and len(along) in (2, 3):
         along = [along[k] for k in axis_order(names)]
     return Roles(
@@ -108,7 +114,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
     """
     n = len(roles.positions)
     size, offset = np.ones(n), np.zeros(n)
-    units = ("m",) * n if robot is None else robot.units
+    units = ["m"] * n if robot is None else [*robot.units]
     guessed = []
     for k, (channel, native) in enumerate(zip(roles.columns or (None,) * n, units, strict=False)):
         name, text = (f"column {k}", None) if channel is None else (channel.name, channel.unit)
@@ -126,6 +132,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
         if text is not None:
             ranged = robot if joint_units == "percent" else None
             size[k], offset[k] = _scale(name, text, native, ranged, k)
+            units[k] = text
     if guessed:
         warn(
             f"{', '.join(guessed)} are taken as degrees, as LeRobot's drivers give them unless use_degrees is False: "
@@ -133,7 +140,7 @@ def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None)
             UserWarning,
             3,
         )
-    return Scales(size, offset)
+    return Scales(size, offset, tuple(units))
 
 
 def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tuple[float, float]:
@@ -158,7 +165,38 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
     return float(unit.size), 0.0
 
 
-def check_plausible(positions: Array, robot: Robot) -> None:
+def check_tip(roles: Roles) -> None:
+    """Refuse positions of the tip that are neither two nor three; that poses are joints is not advised."""
+    if (n := len(roles.positions)) in (2, 3):
+        return
+    names = [channel.name for channel in roles.columns]
+    words = {word for name in names for word in words_of(name_of(name))}
+    posed = {*_AXES} <= words or words & {"pose", "tcp", "tip"}
+    joints = "" if posed else ", or say that the columns are the joints (space='joints', --joints)"
+    among = f" among {first_names(names, 12)}" if names else ""
+    raise TrajectoryError(
+        f"expected a movement of the tip, of 2 or 3 dimensions, got {n}{among}; "
+        "choose the position (columns=, in the shell --columns), and give the orientation, as a rotation vector or "
+        f"angles, as a quaternion in columns qw, qx, qy, qz{joints}"
+    )
+
+
+def check_count(roles: Roles, robot: Robot) -> None:
+    """Refuse another number of columns than the arm has joints."""
+    if len(roles.positions) != robot.n_joints:
+        raise TrajectoryError(
+            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
+            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
+        )
+
+
+_DEGREES = (
+    "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
+    "--joint-units"
+)
+
+
+def check_plausible(positions: Array, robot: Robot, remedy: str = _DEGREES) -> None:
     """Refuse joint positions (T, n) [rad, m] that are turns beyond the limits: degrees that are taken for radians."""
     beyond = np.maximum(positions.max(axis=0) - robot.upper, robot.lower - positions.min(axis=0))
     wrong = np.array([unit == "rad" for unit in robot.units]) & (beyond > tau)
@@ -167,9 +205,7 @@ def check_plausible(positions: Array, robot: Robot) -> None:
         value = positions[np.argmax(np.abs(positions[:, k])), k]
         raise TrajectoryError(
             f"expected radians between {robot.lower[k]:.4g} and {robot.upper[k]:.4g} of {robot.joints[k]}, got "
-            f"{value:.4g}; "
-            "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
-            "--joint-units"
+            f"{value:.4g}; {remedy}"
         )
 
 
@@ -288,6 +324,24 @@ def _check_no_others(names: Sequence[str], robot: Robot) -> None:
             f"expected the joints {', '.join(robot.joints)}, got {', '.join(others)}, which {robot.name} has besides; "
             "choose the tip that they move (tip=, in the shell --tip), or rename the columns"
         )
+
+
+def _check_sides(names: Sequence[str], robot: Robot) -> None:
+    """Refuse columns, in the order of the joints, whose names say the other arm than those of joints, or of the tip."""
+    for name, joint in zip(names, robot.joints, strict=True):
+        said, meant = _side_said(name), _side_said(joint) or _side_said(robot.tip)
+        if said and meant and said != meant:
+            raise TrajectoryError(
+                f"expected a recording of the {meant} arm, as {joint} and the tip {robot.tip} say, got {name}, of the "
+                f"{said} one; choose the tip of that arm (tip=, in the shell --tip), other columns, or rename them"
+            )
+
+
+def _side_said(name: str) -> str:
+    """The side that words of a name say, spelled out or, where none is, by its letter; "" of none, and of both."""
+    said = [match[1] for word in words_of(split_head(name)[0]) if (match := _SIDE.fullmatch(word))]
+    sides = {side for side in said if side in _SIDES} or {side for side in _SIDES for word in said if word == side[0]}
+    return sides.pop() if len(sides) == 1 else ""
 
 
 def _warn_of_other_names(names: Sequence[str], robot: Robot) -> None:

@@ -32,12 +32,12 @@ _WORDS = tuple(
         (r"save np\.moveaxis\(array, 1, 2\), of one movement array\.T", "turn the array before it is saved"),
         (r"labels\.astype\(str\)", "plain text"),
         (
-            r"choose columns, or say that it is a movement of the joints \(joints=True, --joints\)",
+            r"choose the position \(columns=, .{0,20}--columns\), and give .{0,90}(?:, or say .{0,50}--joints\))?",
             "make a library of movements in the plane or in space; if these move the joints of an arm, execute them in "
             "the shell: kineme move with --joints",
         ),
         (r"choose another place \(--at\), free the orientation .{0,80}\(--scale\)", _SMALLER),
-        (r"is the movement in millimeters\? --scale 0\.001 makes it meters", _SMALLER),
+        (r"is it in millimeters\? .{0,40} --scale 0\.001 makes a movement so", _SMALLER),
         (r"choose another place \(--at\), orientation .{0,80}\(--rest\)", f"{_SMALLER}, or choose another arm"),
         (
             r"choose another goal \(--goal\) or start \(--at\) of the joints",

@@ -49,6 +49,8 @@ class ArmsOut(BaseModel):
 class MoveRequest(PrimitiveRequest):
     """A movement for an arm; `size` is its largest extent there [m], `at` and `goal` are in the frame of the robot.
 
+    Of a movement of joints, `at` and `goal` are in the units and the order of their columns.
+
     Instead of a goal, `displacement` is the way from start to goal in the unit of the library: of the positions, or of
     all columns that move, as `/api/rollout` says start and goal.
     """
