@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.io.reading.merge_files import Recordings
 from kineme.library import commit
 from kineme.library.storage.source import Source
@@ -210,14 +210,17 @@ def as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
     if given is None:
         return [None] * len(demos)
     values = _one_each(what, given, len(demos))
+    remedy = f"name {'the action' if what == 'label' else 'who showed it'}, or pass None where it has no name"
+    names: dict[Any, str | None] = {None: None}
     for i, name in enumerate(values):
         if isinstance(name, (list, tuple, dict, np.ndarray)) or (isinstance(name, float) and math.isnan(name)):
-            named = "the action" if what == "label" else "who showed it"
             raise TrajectoryError(
-                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; "
-                f"name {named}, or pass None where it has no name"
+                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; {remedy}"
             )
-    names = {name: None if name is None else check_name(as_name(name)) for name in dict.fromkeys(values)}
+        try:
+            names[name] = names[name] if name in names else check_name(as_name(name))
+        except SpecificationError as error:
+            raise SpecificationError(f"{name_of(i, demos.names)}: {error}; {remedy}") from None
     return [names[name] for name in values]
 
 
