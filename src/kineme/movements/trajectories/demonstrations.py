@@ -17,7 +17,7 @@ from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.tables.layout import Column, Layout, Parsed
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
-from kineme.movements.trajectories.labels import as_indices, label_array
+from kineme.movements.trajectories.labels import as_indices, label_array, spelled_alike
 from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
@@ -351,7 +351,7 @@ def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
         raise TrajectoryError(
             f"expected labels that are texts or numbers, as classes have an order, got {error}"
         ) from None
-    return labels
+    return spelled_alike(labels)
 
 
 def is_data_frame(value: Any) -> bool:
