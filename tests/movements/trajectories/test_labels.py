@@ -54,8 +54,10 @@ def test_numbers_stay_numbers(labels):
 
 def test_whole_numbers_of_64_bits_stay_exact():
     labels = [5, 2**63 + 5, np.uint64(2**63 + 9), -1]
-    known = Recognizer().fit([np.random.default_rng(k).normal(size=(20, 2)).cumsum(axis=0) for k in range(4)], labels)
-    assert known.classes_.tolist() == sorted(map(int, labels))
+    movements = [np.random.default_rng(k).normal(size=(20, 2)).cumsum(axis=0) for k in range(4)]
+    for classifier in ("auto", "svm"):
+        known = Recognizer(classifier=classifier).fit(movements, labels)
+        assert known.classes_.tolist() == sorted(map(int, labels))
 
 
 def test_labels_that_look_the_same_are_one_class_spelled_as_the_first():
