@@ -119,7 +119,11 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     if len(x) < MIN_SAMPLES:
         raise TrajectoryError(
             f"{who}: expected at least {MIN_SAMPLES} samples, got {len(x)}"
-            + ("; samples run along the first axis: transpose the array" if x.shape[1] > len(x) else "")
+            + (
+                "; samples run along the first axis: transpose the array"
+                if x.shape[1] >= MIN_SAMPLES and len(x)
+                else ""
+            )
             + ("; pass one movement of several dimensions as [array]" if flat else "")
         )
     return x

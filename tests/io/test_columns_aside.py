@@ -83,12 +83,43 @@ def test_what_is_generated_has_the_columns_of_its_demonstration_whatever_their_n
 def test_counters_numbers_of_things_and_other_clocks_are_no_coordinates(tmp_path):
     clocks = ["epoc (ms)", "motionTimestamp_sinceReboot(s)"]
     others = ["PacketCounter", "loggingSample(N)", "stroke_id", "TrackingId", "__index_level_0__", *clocks]
-    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x", "low (min)", *others]))
+    counted = dict.fromkeys(others[:2], np.arange(T))
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x", "low (min)", *others], counted))
     assert read.detected[0][0].columns == ("x", "low (min)")
     assert {*read.detected[0][0].ignored} == {*others}
     sessions = np.repeat([0.0, 1.0], T // 2)
     read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x"], {"session": sessions}))
     assert (read.demonstrations.dimensions, len(read)) == (("x",), 2)
+
+
+COUNT = np.arange(T)
+
+
+@pytest.mark.parametrize("to", ["csv", "parquet", "json", "frame"])
+@pytest.mark.parametrize(
+    ("columns", "aside"),
+    [
+        ({"thumb": U, "index": np.sin(U), "ring": U}, set()),
+        ({"thumb": U, "index": np.rint(9 * np.sin(3 * U)), "ring": U}, set()),
+        ({"index_1": np.sin(U), "index_2": U}, set()),
+        ({"row": np.full(T, 5), "col": U}, set()),
+        ({"index": COUNT, "thumb_x": U, "index_x": np.sin(U)}, {"index"}),
+        ({"frame": COUNT // 10, "sub frame": COUNT % 10, "x": U}, {"frame", "sub frame"}),
+        ({"packet": (COUNT + 65_530) % 65_536, "num_bodies": COUNT % 3, "x": U}, {"packet", "num_bodies"}),
+        ({"frame": COUNT + (COUNT > 9), "task_index": 0 * COUNT, "x": U}, {"frame", "task_index"}),
+        ({"demo": COUNT // 20, "frame": np.where(COUNT < 20, COUNT, COUNT - 15), "x": U}, {"demo", "frame"}),
+    ],
+)  # fmt: skip
+def test_columns_that_are_named_as_counters_are_left_aside_if_they_count(tmp_path, columns, aside, to):
+    frame, path = pd.DataFrame({"t": U} | columns), tmp_path / f"a.{to}"
+    if to == "frame":
+        read = kineme.Demonstrations.of(frame).dimensions
+    else:
+        path.write_text(frame.to_json(orient="records")) if to == "json" else getattr(frame, f"to_{to}")(
+            path, index=False
+        )
+        read = kineme.read_recordings(path).detected[0][0].columns
+    assert read == tuple(head for head in columns if head not in aside)
 
 
 def test_dates_that_are_not_understood_are_no_names_before_the_times():

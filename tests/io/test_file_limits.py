@@ -209,7 +209,7 @@ def test_labels_of_json_are_texts_each_by_itself(labels, expected):
 
 @pytest.mark.parametrize("labels", [["a", ["b"], "c"], ["a", {"b": 1}, "c"], ["a", float("nan"), "c"]])
 def test_labels_of_json_that_are_no_names_are_refused(labels):
-    with pytest.raises(kineme.errors.DataError, match="expected labels that are texts or numbers, got"):
+    with pytest.raises(kineme.errors.DataError, match="movement 1: expected a label that is text or a number, got"):
         read(as_json(labels=labels), "a.json")
 
 
@@ -286,7 +286,7 @@ def test_numbers_beyond_float64_are_infinite():
 
 
 def test_labels_that_are_records_are_refused():
-    with pytest.raises(kineme.errors.DataError, match="expected labels that are texts or numbers, got"):
+    with pytest.raises(kineme.errors.DataError, match="movement 0: expected a label that is text or a number, got"):
         read(npz(positions=np.stack((X, X)), labels=np.zeros(2, [("a", "f8")])))
 
 

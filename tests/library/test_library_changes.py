@@ -161,6 +161,7 @@ def test_any_text_is_a_name_and_only_a_name(library, name, place, tmp_path):
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1)
 
 
+@pytest.mark.filterwarnings("ignore:a symbol named")  # ? and -
 @given(names=st.lists(TEXT, min_size=30, max_size=30))
 def test_names_come_back_as_they_were_given_but_composed(tmp_path_factory, names):
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
@@ -184,7 +185,7 @@ def test_one_name_in_two_forms_of_unicode_is_one_symbol(library):
 def test_a_decomposed_name_of_an_earlier_library_is_found(library, monkeypatch):
     composed, decomposed = (normalize(form, "café") for form in ("NFC", "NFD"))
     with monkeypatch.context() as earlier:
-        earlier.setattr(changes, "check_name", str)
+        earlier.setattr(changes, "check_symbol", str)
         library.rename("wave", decomposed)
     assert library[composed].name == decomposed
     assert library.learn(draw_movements(1, seed=9), labels=[composed]).symbols == ()
@@ -313,6 +314,20 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(library, change, mes
     with pytest.raises(SpecificationError, match=message):
         change(library)
     assert contents(library) == before
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda it: it.learn(draw_movements(1, seed=9), ["Unknown"]),
+        lambda it: it.rename("wave", "?"),
+        lambda it: it.split("wave", [1], "unknown"),
+        lambda it: it.assign([1], "-"),
+    ],
+)
+def test_a_symbol_that_is_named_as_annotations_name_none_is_warned_of(library, change):
+    with pytest.warns(UserWarning, match=r"a symbol named '(\?|-|[Uu]nknown)' counts as none in annotations"):
+        change(library)
 
 
 def test_the_text_of_a_library_reads_no_members(library, monkeypatch):

@@ -253,7 +253,9 @@ def test_what_cannot_be_stored_is_refused_before_anything_is(library, movements,
 
 @pytest.mark.parametrize(("label", "shown"), [("", "''"), ("a\ud800", r"'a\ud800'")])
 def test_a_label_is_text(library, label, shown):
-    with pytest.raises(kineme.errors.SpecificationError, match=rf"expected a name .* got {re.escape(shown)}"):
+    with pytest.raises(
+        kineme.errors.SpecificationError, match=rf"^trajectory 1.*expected a name .* got {re.escape(shown)}"
+    ):
         library.learn(draw_movements(2), labels=["fine", label])
     assert len(library) == 0
 

@@ -126,6 +126,9 @@ def test_an_answer_says_its_rule_and_what_it_promises():
     strange = recognizer.recognize(draw_shapes([25, 25, 4], spread=0.4)[28])  # near one class, novel to all
     assert (strange.rule, strange.certainty) == ("strangers", "looks like")
     assert {RULES[one.rule] for one in [*answers, once, strange]} == set(RULES.values())
+    of_one = Recognizer().fit(draw_shapes([25, 25, 1])).recognize(draw_shapes([25, 25, 2])[50])
+    assert (of_one.rule, of_one.calibrated) == ("pooled", True)  # by the others: its class has no scores
+    assert "classes with two or more demonstrations together" in of_one.promise
     for one in [*answers, once, strange]:
         assert one.promise == RULES[one.rule]
         assert f"rule={one.rule!r}" in repr(one)

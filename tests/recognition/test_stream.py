@@ -177,7 +177,12 @@ def test_nothing_is_claimed_before_there_is_motion(recognizer):
 def test_too_little_to_finish_is_refused(recognizer):
     live = recognizer.stream()
     live.update(0.0, [0.0, 0.0])
-    with pytest.raises(TrajectoryError, match="at least 4 samples, got 1"):
+    for finish in (live.finish, live.next, recognizer.stream().next):
+        said = r"^expected a movement of at least 4 samples since the stream began it, got [01]; update it with more"
+        with pytest.raises(TrajectoryError, match=said):
+            finish()
+    live.update(0.0, [np.nan, 0.0])
+    with pytest.raises(TrajectoryError, match="got 1 and 1 sample skipped; update"):
         live.finish()
 
 

@@ -55,6 +55,16 @@ def test_widths_need_movements_that_differ():
         Recognizer().fit(np.repeat(draw_shapes([1])[0].positions[None], 3, axis=0), ["a", "b", "c"])
 
 
+@pytest.mark.parametrize("each", [1, 3])
+def test_movements_with_two_labels_each_are_refused_with_the_labels(each):
+    first, other = [draw_shapes([each], seed=seed) for seed in (1, 2)]
+    labels = [label for label in "abcd" for _ in range(each)]
+    with pytest.raises(SpecificationError, match="got the same ones with 'a' and 'b'; merge the labels"):
+        Recognizer().fit([*first, *first, *other, *other], labels)
+    known = Recognizer().fit([*first, *first, *draw_shapes([5], seed=3)], labels[: 2 * each] + ["e"] * 5)
+    assert np.isfinite(known.comparison_.similarity.widths).all()
+
+
 def test_classes_that_coincide_do_not_make_the_kernels_blind():
     """N and Z are one under any rotation; another N, drawn a little differently, is still like both."""
     corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1.0]])

@@ -56,6 +56,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
+    from kineme.errors import heard_warnings
     from kineme.io.inspection.inspect import notes_on_heads, notes_on_samples
     from kineme.io.reading.formats import root_of
     from kineme.library.learn import learn_recordings
@@ -84,7 +85,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with opened(folder, create=True) as library:
         before = library.version
-        with progress(total=len(parsed), desc="learning", unit="movement") as bar:
+        with progress(total=len(parsed), desc="learning", unit="movement") as bar, heard_warnings() as heard:
             report = learn_recordings(
                 library.store, parsed, options, labels, lambda done, _: bar.update(done - bar.n), root, people
             )
@@ -101,6 +102,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "problems": list(map(str, parsed.problems)),
             "notes": [
                 *parsed.notes,
+                *heard,
                 *notes_on_heads(parsed),
                 *notes_on_samples(parsed),
                 *_notes_on_order(library, parsed),

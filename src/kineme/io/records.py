@@ -14,6 +14,7 @@ from kineme.reporting.text import first_names
 _SHOWN = 20  # columns that a sentence names
 
 UNKNOWN = "unknown"  # the label of unknown motion, in files that have but one text for each stretch
+NO_SYMBOLS = frozenset({"", "-", "?", UNKNOWN})  # what people write over the name of a symbol where there is none
 
 
 class Problem(NamedTuple):

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.io.reading.merge_files import Recordings
 from kineme.library import commit
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
-from kineme.library.storage.symbols import check_name
+from kineme.library.storage.symbols import check_name, check_symbol
 from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
 from kineme.movements.channels.column_match import are_unknown, columns_recorded, may_be
 from kineme.movements.channels.coordinates import columns_of_kinds
@@ -210,14 +210,18 @@ def as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
     if given is None:
         return [None] * len(demos)
     values = _one_each(what, given, len(demos))
+    remedy = f"name {'the action' if what == 'label' else 'who showed it'}, or pass None where it has no name"
+    names: dict[Any, str | None] = {None: None}
+    check = check_symbol if what == "label" else check_name
     for i, name in enumerate(values):
         if isinstance(name, (list, tuple, dict, np.ndarray)) or (isinstance(name, float) and math.isnan(name)):
-            named = "the action" if what == "label" else "who showed it"
             raise TrajectoryError(
-                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; "
-                f"name {named}, or pass None where it has no name"
+                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {name!r}; {remedy}"
             )
-    names = {name: None if name is None else check_name(as_name(name)) for name in dict.fromkeys(values)}
+        try:
+            names[name] = names[name] if name in names else check(as_name(name))
+        except SpecificationError as error:
+            raise SpecificationError(f"{name_of(i, demos.names)}: {error}; {remedy}") from None
     return [names[name] for name in values]
 
 

@@ -90,7 +90,8 @@ class Answer:
     calibrated : bool
         Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`: for
         people who showed some; for others, of whom several times as many may be called unknown, only if `fit` was told
-        the groups. If not, as with one demonstration of each class, p-values are a guess.
+        the groups. If not, as with one demonstration of each class, p-values are a guess. Of a class
+        with one demonstration beside classes with more, more movements than that may be called unknown.
     ranked : tuple of labels
         Best first, in the order of the classifier.
     nearest : tuple of Neighbor

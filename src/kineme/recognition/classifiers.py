@@ -318,7 +318,8 @@ def fit_support_vectors(comparison: Comparison, references: References) -> Suppo
 
     similarity = comparison.similarity.widened(_WIDER)
     gram = np.exp(similarity.log_average(references.described, references.described))
-    model = SVC(kernel="precomputed", C=_PENALTY, decision_function_shape="ovr").fit(gram, references.labels)
+    numbers = np.repeat(np.arange(len(references.classes)), references.counts)  # labels may be any, as 0.5
+    model = SVC(kernel="precomputed", C=_PENALTY, decision_function_shape="ovr").fit(gram, numbers)
     return SupportVectors(similarity, model)
 
 

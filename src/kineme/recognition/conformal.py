@@ -58,8 +58,9 @@ _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenl
 RULES = {
     "class": "Of known movements most like this class, by people who showed some, about the error rate or less are "
     "called unknown; by other people, on average, only if groups told apart who showed what.",
-    "pooled": "Of known movements of all classes together, by people who showed some, about the error rate or less are "
-    "called unknown; by other people, on average, only if groups told apart who showed what.",
+    "pooled": "Of known movements of all classes with two or more demonstrations together, by people who showed some, "
+    "about the error rate or less are called unknown; by other people, on average, only if groups told apart who "
+    "showed what.",
     "strangers": "More novel than about the error rate of the movements that were shown, but much nearer to one class "
     "than to the next, as movements by other people are: a guess, unless groups tell who showed what.",
     "guess": "Too few demonstrations tell the error rate: any share of known movements may be called unknown.",
@@ -97,7 +98,8 @@ class Calibration:
 
     1. "class": those of the class (for novelties, of demonstrations most like it), where they suffice for the error
        rate; 19 do for 0.05. The rate holds for each class.
-    2. "pooled": those of all classes. The rate holds for movements of all classes together. Each is scored against as
+    2. "pooled": those of all classes. The rate holds for movements of all classes with two or more demonstrations
+       together; one alone gives no score, and of movements of its class more may be unknown. Each is scored against as
        many demonstrations of its class as class c has, so that unequal classes compare; and scaled by a mean from
        which it is left out.
     3. "guess": none. ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c;

@@ -15,6 +15,7 @@ from kineme.errors import TrajectoryError
 from kineme.kernels.rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.labels import spelled_alike
 from kineme.movements.trajectories.trajectory import HasDemonstrations, MovementLike, MovementsLike, Trajectory
 from kineme.recognition.answer import Answer, is_one, known_classes
 from kineme.recognition.classifiers import BY_CONVOLUTIONS, CLASSIFIERS, NearestProfiled, SupportVectors, fit_classifier
@@ -296,6 +297,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         labels, answers = check_labels(demos, y), self.predict(demos)
         if isinstance(labels[0], str) != isinstance(answers[0], str):
             raise TrajectoryError(f"expected labels as those of fit, such as {answers[0]!r}, got {labels[0]!r}")
+        if isinstance(answers[0], str):
+            labels = spelled_alike(np.concatenate((answers, labels)))[len(answers) :]
         return float(np.average(answers == labels, weights=sample_weight))
 
     @overload

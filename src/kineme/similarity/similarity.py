@@ -275,18 +275,35 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     coincide, as N and Z do under any rotation, the width is a hundredth of the movements' size. Estimated from at most
     500 evenly spaced movements, which bounds the cost.
 
-    Returns (R,). Raises `SpecificationError`: all movements are the same, or there is only one.
+    Returns (R,). Raises `SpecificationError`: all movements are the same, or there is only one, or those of one label
+    are there with another one too.
     """
     chosen = evenly_spaced(len(labels), _ROWS)
     some, owners = described.take(chosen), labels[chosen]
     sizes = some.sizes()
     nearest = zip(_nearest_of_others(some, owners, chosen), sizes, strict=True)
     widths = [_share_of_median(distances, _SAME * size) for distances, size in nearest]
+    if None in widths:
+        _check_labels(some, owners, [width is None for width in widths])
     if all(width is None for width in widths):
         raise SpecificationError(
             "expected training movements that differ, got one movement or all the same; add demonstrations"
         )
     return np.maximum(_as_wide_as_twins(widths, some), _LEAST * sizes)
+
+
+def _check_labels(described: Described, owners: NDArray[np.generic], without_width: list[bool]) -> None:
+    """Refuse copies with two labels that leave a representation without a width in which movements differ."""
+    copies, differ = owners[:, None] != owners, False
+    largest = (_SAME * described.sizes()) ** 2
+    for squares, same, is_without in zip(squared_distances(described, described), largest, without_width, strict=True):
+        copies &= squares <= same
+        differ |= is_without and bool((squares > same).any())
+    if differ and copies.any():
+        first, second = owners[np.argwhere(copies)[0]].tolist()
+        raise SpecificationError(
+            f"expected labels whose movements differ, got the same ones with {first!r} and {second!r}; merge the labels"
+        )
 
 
 def _as_wide_as_twins(widths: list[float | None], described: Described) -> Array:

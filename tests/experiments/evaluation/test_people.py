@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.io.reading.merge_files import each_person
 from kineme.io.writing.write_movement import write_movement
 from kineme_experiments.evaluation.data import load_data
 
@@ -51,6 +52,12 @@ def test_a_movement_that_is_left_out_takes_no_person_along(archive):
 def test_nothing_is_known_without_the_array_or_of_one_person(archive):
     assert load_data(str(archive())).people is None
     assert load_data(str(archive(people=np.array(["?"] * 8)))).people is None
+
+
+@pytest.mark.parametrize("people", [["1", "", "2", "1"] * 2, [1.0, np.nan, 2.0, 1.0] * 2])
+def test_a_person_who_is_empty_is_not_told(archive, people):
+    path = archive(people=np.array(people))
+    assert each_person(path, kineme.read_recordings(path).sources) == ["1", None, "2", "1"] * 2
 
 
 def test_too_few_people_are_refused(archive):

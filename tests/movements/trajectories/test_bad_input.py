@@ -54,6 +54,12 @@ def test_bad_positions_are_refused(arrays, message):
         Demonstrations.from_arrays(arrays, names=["one", "two"])
 
 
+def test_nothing_is_advised_to_be_transposed_that_stays_too_short():
+    for shape in ((0, 2), (2, 3)):
+        with pytest.raises(TrajectoryError, match=rf"expected at least 4 samples, got {shape[0]}$"):
+            Demonstrations.from_arrays([np.zeros(shape)])
+
+
 BAD_TIMES = {
     "duplicate": (_stamps(4, T[3]), "trajectory 1 ('two'): expected strictly increasing times, got duplicate stamps 0.428571429 and 0.428571429 at samples 3 and 4; sort the samples and drop repeated ones"),
     "decreasing": (T[::-1], "trajectory 1 ('two'): expected strictly increasing times, got decreasing stamps 1 and 0.857142857 at samples 0 and 1"),

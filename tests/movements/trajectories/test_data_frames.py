@@ -63,6 +63,16 @@ def test_what_was_taken_is_said():
     assert Demonstrations.of([_frame(), _frame()])[[1]].dimensions == ("x", "y")
 
 
+def test_frames_have_the_order_and_the_units_of_the_first():
+    first, other = _frame().rename(columns={"x": "x [m]", "y": "y [m]"}), _frame()[["y", "time", "x"]]
+    _check(Demonstrations.of([_frame(), other]), n=2)
+    millimeters = pd.DataFrame({"y [mm]": 1000 * Y, "time": T, "x [mm]": 1000 * X})
+    both = Demonstrations.of([first, millimeters])
+    np.testing.assert_allclose(both[0].positions, both[1].positions)
+    with pytest.raises(TrajectoryError, match=r"data frame 1: expected 'x' in 'm', as the others have it, got no unit"):
+        Demonstrations.of([first, other])
+
+
 def test_frames_are_learned_recognized_and_cut():
     demos = Demonstrations.of([_frame(), _frame(x=Y)])
     frames = [_frame(), _frame(x=Y)]

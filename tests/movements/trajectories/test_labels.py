@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import tracemalloc
+from unicodedata import normalize
 
 import numpy as np
 import pytest
@@ -49,6 +50,23 @@ def test_numbers_stay_numbers(labels):
     found = Demonstrations.from_arrays([X, X], labels).labels
     assert found.dtype == np.asarray(labels).dtype
     assert found.tolist() == np.asarray(labels).tolist()
+
+
+def test_whole_numbers_of_64_bits_stay_exact():
+    labels = [5, 2**63 + 5, np.uint64(2**63 + 9), -1]
+    movements = [np.random.default_rng(k).normal(size=(20, 2)).cumsum(axis=0) for k in range(4)]
+    for classifier in ("auto", "svm"):
+        known = Recognizer(classifier=classifier).fit(movements, labels)
+        assert known.classes_.tolist() == sorted(map(int, labels))
+
+
+def test_labels_that_look_the_same_are_one_class_spelled_as_the_first():
+    composed, decomposed = (normalize(form, "caf\u00e9") for form in ("NFC", "NFD"))
+    movements = [np.random.default_rng(k).normal(size=(20, 2)).cumsum(axis=0) for k in range(4)]
+    for first, second in ((composed, decomposed), (decomposed, composed)):
+        known = Recognizer().fit(movements, [first, second, "b", "b"])
+        assert known.classes_.tolist() == sorted(["b", first])
+        assert known.score(movements[:2], [second, first]) == 1
 
 
 def test_the_labels_of_the_caller_are_not_ours():

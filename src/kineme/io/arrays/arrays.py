@@ -270,10 +270,13 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
     if np.atleast_1d(given).shape != (n,):
         shape = np.atleast_1d(given).shape
         raise DataError(f"expected one label for each of the {n} movements, got labels of shape {shape}")
-    return [_label(label) for label in np.atleast_1d(given).tolist()]
+    return [_label(i, label) for i, label in enumerate(np.atleast_1d(given).tolist())]
 
 
-def _label(value: Any) -> str | None:
+def _label(i: int, value: Any) -> str | None:
     if isinstance(value, (list, dict, tuple)) or value != value:  # noqa: PLR0124 - only NaN differs from itself
-        raise DataError(f"expected labels that are texts or numbers, got {value!r}")
+        raise DataError(
+            f"movement {i}: expected a label that is text or a number, got {value!r}; name the action, or write an "
+            "empty text where it has no name"
+        )
     return (value.decode("utf-8", "replace") if isinstance(value, bytes) else as_name(value)) or None

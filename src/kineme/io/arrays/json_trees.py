@@ -202,7 +202,7 @@ def _are_objects(value: Any) -> bool:
 def _is_sample(entry: Mapping[str, Any]) -> bool:
     """Tell whether an object is one sample, not a movement whose entries are lists over time."""
     for name, value in entry.items():
-        if is_time(name) or counts_samples(name):
+        if is_time(name) or counts_samples(name, entry):
             return not isinstance(value, list)
     if any(map(_sides, entry.values())):
         return True

@@ -92,7 +92,12 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         raise DataError(
             f"expected one array of coordinates, got {shapes}; say which with columns=, in the shell --columns"
         )
-    roles = choose_roles(heads, kinds, layout)
+
+    def values(k: int) -> Any:  # of the first movement
+        entry = first.entries.get(owners[k])
+        return None if entry is None else np.asarray(entry).reshape(first.length, -1)[:, k - owners.index(owners[k])]
+
+    roles = choose_roles(heads, kinds, layout, values=values)
     others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)

@@ -10,8 +10,7 @@ from pathlib import PurePosixPath
 from kineme.errors import TrajectoryError
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, in_shell
-from kineme.movements.channels.column_match import Columns, columns_like
-from kineme.movements.channels.detect import unit_of
+from kineme.movements.channels.column_match import Columns, columns_detected, columns_like
 from kineme.movements.tables.columns import beside_positions
 from kineme.movements.tables.layout import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
@@ -33,7 +32,7 @@ def in_one_set(
     files: Sequence[FileRead], by_number: bool = False
 ) -> tuple[list[FileRead], list[FileRead], list[Problem]]:
     """Return files with the columns of most in their order and units, others without names of columns, and problems."""
-    columns = [_columns_of(file.detected) for file in files]
+    columns = [columns_detected(file.detected) for file in files]
     keys = [(frozenset(own.names), sensors_of(file.path)) for file, own in zip(files, columns, strict=True)]
     named = [key for key, file, own in zip(keys, files, columns, strict=True) if not _is_nameless(file, own)]
     most = Counter(named or keys).most_common(1)[0][0]
@@ -69,12 +68,12 @@ def in_one_set(
 
 def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> list[Problem]:
     """Say which columns files lack, or have besides, that have other numbers of columns than most."""
-    columns = [_columns_of(file.detected) for file in most]
+    columns = [columns_detected(file.detected) for file in most]
     named = Counter(own for own in columns if not own.are_nameless)
     ours, n_dims = (named or Counter(columns)).most_common(1)[0][0], most[0].n_dims
     problems = []
     for file in files:
-        own = _columns_of(file.detected)
+        own = columns_detected(file.detected)
         unlike = "" if _is_nameless(file, own) or not named else f": {_differences(own, ours)}"
         problems.append(Problem(file.path, None, f"{file.n_dims} dimensions where most have {n_dims}{unlike}"))
     return problems
@@ -82,7 +81,7 @@ def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> li
 
 def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
     """Return a sentence if files have the columns in another order, and one if they have them in other units."""
-    several = [own for own in map(_columns_of, detected) if {*own.names} == {*ours.names}]
+    several = [own for own in map(columns_detected, detected) if {*own.names} == {*ours.names}]
     notes = []
     if others := [own for own in several if own.names != ours.names]:
         moved = [[a, b] for a, b in zip(others[0].heads, ours.heads, strict=True) if a != b]
@@ -144,8 +143,3 @@ def sensors_of(path: str) -> frozenset[str]:
 
 def _is_nameless(file: FileRead, own: Columns) -> bool:
     return own.are_nameless or not file.detected.named
-
-
-def _columns_of(how: Detected) -> Columns:
-    measured_in = how.measured_in or [""] * len(how.columns)
-    return Columns(how.columns, tuple(a or unit_of(head) for a, head in zip(measured_in, how.columns, strict=True)))

@@ -23,6 +23,7 @@ from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels, kinds_of
 from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
+from kineme.movements.tables.table import as_name
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations, MovementSequence
 from kineme.movements.trajectories.labels import label_array
@@ -292,7 +293,7 @@ def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
     return [source.person or _person(source, of_file(source.path)) for source in sources]
 
 
-def _person(source: Source, listed: list[str] | None) -> str | None:
+def _person(source: Source, listed: list[str | None] | None) -> str | None:
     if listed is None:
         folders = PurePosixPath(source.path).parts
         if source.label in folders[:-2] and source.label != folders[-2]:  # label/person/recording
@@ -304,12 +305,12 @@ def _person(source: Source, listed: list[str] | None) -> str | None:
     return listed[index]
 
 
-def _people_in(file: Path) -> list[str] | None:
+def _people_in(file: Path) -> list[str | None] | None:
     if file.suffix.lower() != ".npz":
         return None
     arrays = Npz(file.read_bytes(), file)
     name = next((name for name in NAMES if name in arrays), None)
-    return None if name is None else [str(person) for person in np.atleast_1d(arrays[name]).tolist()]
+    return None if name is None else [as_name(person) or None for person in np.atleast_1d(arrays[name]).tolist()]
 
 
 def notes_on_gaps(recordings: Recordings) -> list[str]:

@@ -18,7 +18,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded, read_limited
 from kineme.io.reading.merge_files import Recordings, Source, demonstrations_of
-from kineme.io.records import UNKNOWN, Problem
+from kineme.io.records import NO_SYMBOLS, UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
 from kineme.reporting.text import counted, text_in
 from kineme.units import UNITS, converted, split_head, unit_named
@@ -40,8 +40,7 @@ _LABELS = (
 )  # fmt: skip
 _RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
 _CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
-_ERASED = frozenset({"", "-", "?", UNKNOWN})  # what people write over a label
-_NOTHING = _ERASED | {"none", "nan", "null"}  # labels that say that there is none
+_NOTHING = NO_SYMBOLS | {"none", "nan", "null"}  # labels that say that there is none
 
 
 class LabelRow(NamedTuple):
@@ -140,7 +139,7 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     text = text_in(cells[heads.label].strip())
     # Where kineme wrote that the motion is known, symbols may have names that say elsewhere that there is none.
     is_known = heads.unknown is not None and cells[heads.unknown : heads.unknown + 1] in (["false"], ["False"])
-    nothing = _ERASED if is_known else _NOTHING
+    nothing = NO_SYMBOLS if is_known else _NOTHING
     return LabelRow(start, end, None if text.lower() in nothing else text, recording, place, line, text)
 
 

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Sequence
 from itertools import islice
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.movements.tables.columns import is_time
@@ -242,6 +245,14 @@ def is_missing(cell: str) -> bool:
 def is_number(cell: str, comma: bool) -> bool:
     """Tell whether a cell reads as a number."""
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
+
+
+def numbers_in(cells: Sequence[str], comma: bool) -> NDArray[np.float64]:
+    """Return numbers, NaN for other cells."""
+    try:
+        return np.array(cells, dtype=np.float64)
+    except ValueError:
+        return np.array([as_float(cell.replace(",", ".")) if is_number(cell, comma) else np.nan for cell in cells])
 
 
 def as_float(cell: str) -> float:

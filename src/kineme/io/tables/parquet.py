@@ -112,7 +112,13 @@ def _columns(file: Any, layout: Layout) -> tuple[tuple[str, ...], tuple[str, ...
             "time" if head == _INDEX and kind == "date" else head for head, kind in zip(heads, kinds, strict=True)
         )
     shown = _without_commands(heads, kinds, [types[k] for k in owners], layout)
-    return heads, kinds, owners, choose_roles(shown, kinds, layout)
+
+    def values(k: int) -> Any:  # in the first rows
+        is_nested = pa.types.is_nested(types[owners[k]])
+        batch = None if is_nested else next(file.iter_batches(_ROWS, columns=[names[owners[k]]]), None)
+        return None if batch is None else batch.column(0).to_numpy(zero_copy_only=False)
+
+    return heads, kinds, owners, choose_roles(shown, kinds, layout, values=values)
 
 
 def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = None) -> tuple[Table, Roles]:

@@ -26,9 +26,10 @@ from kineme.io.tables.dialect import (
     detect_dialect,
     is_missing,
     marks_within,
+    numbers_in,
     split,
 )
-from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.columns import Roles, choose_roles, counts_samples
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import FLAGS, Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
@@ -44,6 +45,7 @@ _INTEGER, _DIGITS = re.compile(r"[-+]?\d{16,}"), 300
 _EMPTY_LINE = re.compile(rb"\n[ \t\r]*\n")
 _SMOOTH = 0.3  # of the range: a step from 999 to 1.002 is less if these are thousands, and more if they are decimals
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # a number that may be thousands
+_NO_COUNT = np.array([0.5])  # in place of cells that are not read yet
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
@@ -64,14 +66,9 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
         return _read_export(data, encoding, export, layout)
     dialect = detect_dialect(_lines(data, encoding))
     _check_memory(data, dialect)
-    roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
+    dialect, roles, rows, faults = _roles_and_rows(data, encoding, dialect, layout)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
-    texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
     flags = {k for k, kind in enumerate(dialect.kinds) if kind == "flag"}
-    texts |= flags
-    if 0 in {roles.label, *roles.movement}:
-        dialect = dialect._replace(names_rows=True)
-    rows, faults = _rows(data, encoding, dialect, texts)
     if roles.time is None and layout.every is None and _EMPTY_LINE.search(data):
         # Refuse samples without times that empty lines part, of which nobody said that they are one movement.
         numbers = [line for line, _ in _samples(data, encoding, dialect)]
@@ -117,6 +114,30 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:  # noqa
     heads = tuple(renamed) if len({*renamed}) == len(renamed) else dialect.heads
     line_of = _line_numbers(data, encoding, dialect)
     return Table(heads, columns, len(rows), line_of, faults, "s" if dated else None, dialect.measured_in), roles
+
+
+def _roles_and_rows(
+    data: bytes, encoding: str, dialect: Dialect, layout: Layout
+) -> tuple[Dialect, Roles, Any, dict[int, str]]:
+    """Find the roles of columns and read their rows; whether those count that are named so is seen in their cells."""
+    roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named, lambda _: _NO_COUNT)
+    are_found = dialect.named and layout.coordinates is None
+    counters = {k for k in roles.positions if are_found and counts_samples(dialect.heads[k])}
+    dated = roles.time is not None and dialect.kinds[roles.time] == "date"
+    texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
+    texts |= {k for k, kind in enumerate(dialect.kinds) if kind == "flag"}
+    if 0 in {roles.label, *roles.movement}:
+        dialect = dialect._replace(names_rows=True)
+    rows, faults = _rows(data, encoding, dialect, texts | counters)
+
+    def values(k: int) -> Any:
+        return numbers_in(rows[f"c{k}"].tolist(), dialect.decimal_comma) if k in counters else rows[f"c{k}"]
+
+    if counters:
+        roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named, values)
+    if counters & {*roles.positions}:
+        rows, faults = _rows(data, encoding, dialect, texts | counters - {*roles.positions})
+    return dialect, roles, rows, faults
 
 
 def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:

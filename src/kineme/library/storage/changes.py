@@ -11,7 +11,7 @@ from kineme.library.storage.read import as_ids
 from kineme.library.storage.rows import Database, Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, CONTINUES, MAX_DOCUMENT
 from kineme.library.storage.store import NOW, Change, Store, repeated
-from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
+from kineme.library.storage.symbols import HOW, add_members, check_symbol, make, state_of
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
@@ -22,7 +22,7 @@ _SAID = ("description", "prototype", "threshold")  # the columns that `annotate`
 @repeated
 def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
-    new = check_name(new)
+    new = check_symbol(new)
     with store.writing("rename") as change:
         state = state_of(change.connection, old, NOW)
         change.detail.update(old=state[_NAME], new=new)
@@ -91,7 +91,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
     with store.writing("merge") as change:
         states = {state[1]: state for state in (state_of(change.connection, name, NOW) for name in names)}
         target = _find(change.connection, into)
-        into = check_name(into) if target is None else target[_NAME]
+        into = check_symbol(into) if target is None else target[_NAME]
         merged_names = [state[_NAME] for state in states.values()]
         change.detail.update(names=merged_names, into=into)
         merged = [state for key, state in states.items() if target is None or key != target[1]]
@@ -114,7 +114,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
 @repeated
 def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
-    new = check_name(new)
+    new = check_symbol(new)
     wanted = as_ids(store, ids)
     with store.writing("split") as change:
         state = state_of(change.connection, name, NOW)
@@ -153,7 +153,7 @@ def assign(  # noqa: PLR0913, PLR0917 - what a symbol gets
         values["description"] = description
     with store.writing("assign") as change:
         state = _find(change.connection, who)
-        who = check_name(who) if state is None else state[_NAME]
+        who = check_symbol(who) if state is None else state[_NAME]
         change.detail.update(symbol=who, movements=len(wanted), how=how, **values)
         continue_from(change, continues)
         key = make(change, who) if state is None else state[1]

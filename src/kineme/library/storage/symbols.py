@@ -13,7 +13,8 @@ from unicodedata import normalize
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
+from kineme.io.records import NO_SYMBOLS
 from kineme.library.storage import rows as sql
 from kineme.library.storage.read import groups, movements, records
 from kineme.library.storage.schema import COLUMNS, MAX_TEXT
@@ -138,6 +139,19 @@ def check_name(name: Any) -> str:
     sql.check_text("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
+    return name
+
+
+def check_symbol(name: Any) -> str:
+    """Return a name that a symbol gets; warn of one that annotations have where there is none."""
+    name = check_name(name)
+    if name.lower() in NO_SYMBOLS:
+        warn(
+            f"a symbol named {name!r} counts as none in annotations that are corrected, and answers with it read as if "
+            "they had none; give it another name, or learn its movements without a label",
+            UserWarning,
+            2,
+        )
     return name
 
 

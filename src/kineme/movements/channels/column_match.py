@@ -62,6 +62,12 @@ def columns_recorded(channels: Channels) -> Columns:
     return Columns(recorded_names(channels), tuple(channel.unit for channel in channels for _ in channel.columns))
 
 
+def columns_detected(how: Detected) -> Columns:
+    """The columns of a file or a data frame as it was read."""
+    measured_in = how.measured_in or [""] * len(how.columns)
+    return Columns(how.columns, tuple(a or unit_of(head) for a, head in zip(measured_in, how.columns, strict=True)))
+
+
 def are_unknown(channels: Channels) -> bool:
     """Tell whether nothing is known of columns but their number: heads count them, not as joints, and say no unit."""
     kinds = {channel.unit or channel.kind for channel in channels}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from kineme.errors import DataError
 from kineme.movements.tables.layout import Column, Layout, listed
@@ -29,6 +31,9 @@ _BESIDE_TIME = TIME_UNITS | _BEGINS | {"unix", "utc", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed", "packet", "counter"})  # of samples
 _BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "n", "id", "count", "level", "logging", "point"})
+# Of a finger and a line of a picture -> what is beside them.
+_NO_COUNTERS = {"index": {"thumb", "middle", "ring", "pinky", "little"}, "row": {"col", "cols", "column"}}
+_OF_PANDAS_OR_THINGS = re.compile(r"unnamed|__index_level_|num(?![a-z])", re.IGNORECASE)  # whatever they hold
 _ROS_HEADER = re.compile(r"(.*[./_])?header[./_](seq|stamp|frame_id)(?![^\W_]).*", re.IGNORECASE)  # of a message
 _ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
@@ -73,11 +78,18 @@ DISCRETE_WORDS = frozenset(
 )  # fmt: skip
 
 
-def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
+def choose_roles(
+    heads: Sequence[str],
+    kinds: Sequence[str],
+    layout: Layout,
+    named: bool = True,
+    values: Callable[[int], Any] | None = None,
+) -> Roles:
     """Find roles by heads and by what columns hold, "number", "flag", "date" or "text"; choices take precedence.
 
     Flags, true and false, are coordinates where they are chosen, or where their heads say a gripper, a button or such.
-    In a file without heads, not `named`, the first column of numbers is time and the others are coordinates.
+    In a file without heads, not `named`, the first column of numbers is time and the others are coordinates. Columns
+    named as counters are left aside if they count, as their `values` say; without these by their heads alone.
     """
     if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
         heads = ["" if k in excluded else head for k, head in enumerate(heads)]
@@ -112,10 +124,11 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
             )
         }
         derived = beside_positions([heads[k] for k in free]) if named else set()
+        counters = _counters(heads, free, values, (time, *movement, label))
         positions = tuple(
             k
             for k in free
-            if not (named and (k in clocks or heads[k] in derived or _says_nothing_new(heads[k], plain)))
+            if not (named and (k in clocks | counters or heads[k] in derived or _says_nothing_new(heads[k], plain)))
             and not _is_left_over(heads[k], layout)
         )
     if not positions:
@@ -385,19 +398,63 @@ def _is_number_of_thing(head: str) -> bool:
     return words_of(head)[-1:] == ("id",)
 
 
-def counts_samples(head: str) -> bool:
-    """Tell whether a head names a counter of samples, or how many things there are: ``frame``, ``num_bodies``."""
+def counts_samples(head: str, beside: Iterable[str] = ()) -> bool:
+    """Tell whether a head names a counter of samples, or how many things there are: ``frame``, ``num_bodies``.
+
+    A finger beside others, and the line of a picture beside its column, are none: ``index``, ``row``.
+    """
     words = [word for word in words_of(head) if not word.isdecimal()]
     if len(words) > 1 and words[0] == "num":
         return True
-    return bool({*words} & _COUNTERS) and {*words} <= _COUNTERS | _BESIDE_COUNTERS
+    if not {*words} & _COUNTERS or not {*words} <= _COUNTERS | _BESIDE_COUNTERS:
+        return False
+    others = {other for word in words for other in _NO_COUNTERS.get(word, ())}
+    return not (others and any(others & {*words_of(each)} for each in beside))
+
+
+def _counters(
+    heads: Sequence[str], among: Iterable[int], values: Callable[[int], Any] | None, beside: Sequence[int | None]
+) -> set[int]:
+    """The columns that are named as counters and, where their values are at hand, count within each movement.
+
+    A movement ends where times, the first column `beside`, go back, or one of the others changes.
+    """
+    several = [k for k in among if counts_samples(heads[k])]
+    certain = {k for k in several if counts_samples(heads[k], heads)}
+    if values is None or not several:
+        return certain
+    times, *names = (None if k is None else values(k) for k in beside)
+    ends = [rows[1:] != rows[:-1] for rows in names if rows is not None]
+    if times is not None and times.dtype.kind in "iufmM":
+        ends.append(times[1:] < times[:-1])
+    apart = np.any(ends, axis=0) if ends else False
+    return {
+        k
+        for k in several
+        if (k in certain and _OF_PANDAS_OR_THINGS.match(heads[k])) or _counts(values(k), apart, k not in certain)
+    }
+
+
+def _counts(values: Any, apart: Any, exactly: bool) -> bool:
+    """Tell whether numbers are whole and go back only where they begin anew; `exactly` from 0 or 1 in steps of 1."""
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return not exactly  # texts
+    filled = numbers[np.isfinite(numbers)]
+    if not len(filled):
+        return not exactly
+    steps = np.diff(numbers)
+    along = steps[~(apart | (steps < -np.ptp(filled) / 2) | np.isnan(steps))]
+    if exactly:
+        return bool((along == 1).all() and filled[0] in (0, 1))
+    return bool((along >= 0).all() and (filled == np.rint(filled)).all())
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """Tell whether a column is redundant: a counter, a stamp beside the times, an unnamed marker, a turning."""
+    """Tell whether a column is redundant: a stamp beside the times, an unnamed marker, a turning."""
     if (
-        counts_samples(head)
-        or _is_number_of_thing(head)
+        _is_number_of_thing(head)
         or not head.strip()
         or _ROS_HEADER.fullmatch(head)
         or _UNNAMED.fullmatch(head)

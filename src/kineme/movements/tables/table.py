@@ -232,7 +232,7 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     kinds = [_kind(values) if inside else "text" for _, values, inside in read]
     if not heads or not len(arrays[0]):
         raise DataError("expected samples, got a data frame without rows")
-    roles = choose_roles(heads, kinds, layout)
+    roles = choose_roles(heads, kinds, layout, values=arrays.__getitem__)
     # Columns as `table_movements` takes them, and the unit of times that are dates.
     columns: list[Any] = list(arrays)
     for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):

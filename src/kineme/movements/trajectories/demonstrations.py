@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import DataError, TrajectoryError, warn
 from kineme.movements.channels.channel import Channels, recorded_names
-from kineme.movements.channels.column_match import in_one_unit
+from kineme.movements.channels.column_match import columns_detected, columns_like, in_one_unit
 from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.tables.layout import Column, Layout, Parsed
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
-from kineme.movements.trajectories.labels import as_indices, label_array
+from kineme.movements.trajectories.labels import as_indices, label_array, spelled_alike
 from kineme.movements.trajectories.movements import Movements, Samples, axis_names, of_channels
 from kineme.movements.trajectories.presented import Presented, with_units
 from kineme.movements.trajectories.trajectory import MovementsLike, Trajectory, unchecked
@@ -351,7 +351,7 @@ def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
         raise TrajectoryError(
             f"expected labels that are texts or numbers, as classes have an order, got {error}"
         ) from None
-    return labels
+    return spelled_alike(labels)
 
 
 def is_data_frame(value: Any) -> bool:
@@ -378,14 +378,19 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
     parsed = [_parse(frame, i, layout) for i, frame in enumerate(frames)]
     if converted := [*dict.fromkeys(said for frame in parsed for said in frame.detected.converted)]:
         warn(f"units are converted to those of most columns: {', '.join(converted)}", UserWarning, 3)
-    dimensions = parsed[0].detected.columns
+    first = columns_detected(parsed[0].detected)
+    dimensions, blocks = first.heads, []
     for i, frame in enumerate(parsed):
-        if frame.detected.columns != dimensions:
+        own = columns_detected(frame.detected)
+        if {*own.names} != {*first.names}:
             raise TrajectoryError(
                 f"data frame {i}: expected the coordinates {list(dimensions)} as in data frame 0, got "
                 f"{list(frame.detected.columns)}; say which with columns= of Demonstrations.from_dataframe"
             )
-    blocks = [frame.block for frame in parsed]
+        try:
+            blocks.append(replace(frame.block, positions=columns_like(frame.block.positions, own, first)))
+        except TrajectoryError as error:
+            raise TrajectoryError(f"data frame {i}: {error}") from error
     pieces = [(block, slice(*rows)) for block in blocks for rows in zip(block.offsets, block.offsets[1:], strict=False)]
     labels: Any = [label for block in blocks for label in block.labels]
     places = [place or None for block in blocks for place in block.places]

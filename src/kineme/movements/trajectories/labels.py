@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from numbers import Number
 from typing import Any
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,21 @@ def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] |
         return _objects([str.__str__(label) for label in present])  # str itself, not a subclass
     if array.dtype != object:
         return array.copy()
-    return np.array(present) if present and isinstance(present[0], _NUMBERS) else _objects(present)
+    if not present or not isinstance(present[0], _NUMBERS):
+        return _objects(present)
+    numbers = np.array(present)
+    # NumPy makes floats of whole numbers above the signed ones beside smaller ones, as hashes are.
+    are_rounded = numbers.dtype.kind == "f" and all(isinstance(label, (int, np.integer)) for label in present)
+    return _objects(list(map(int, present))) if are_rounded else numbers
+
+
+def spelled_alike(labels: NDArray[Any]) -> NDArray[Any]:
+    """Return labels; texts that look the same, composed or not, are spelled as the first of them."""
+    if labels.dtype != object or not len(labels) or not isinstance(labels[0], str):
+        return labels
+    first: dict[str, str] = {}
+    spelled = {label: first.setdefault(normalize("NFC", label), label) for label in dict.fromkeys(labels.tolist())}
+    return _objects([spelled[label] for label in labels.tolist()])
 
 
 def _objects(texts: Sequence[Any]) -> NDArray[Any]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.preparation.glitches import without_glitches
@@ -22,6 +22,7 @@ from kineme.recognition.early.earlier import Earlier, earlier, remembered, with_
 from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import ALLOWANCE, Hypotheses, Prefixes, smoother
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
+from kineme.reporting.text import counted
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.similarity.comparison import Comparison, References
@@ -165,6 +166,12 @@ class Live:
         samples = self._path.kept()
         if until is not None:
             samples = samples[samples[:, 0] <= until]
+        if len(samples) < MIN_SAMPLES:
+            skipped = f" and {counted(self.skipped, 'sample')} skipped" if self.skipped else ""
+            raise TrajectoryError(
+                f"expected a movement of at least {MIN_SAMPLES} samples since the stream began it, got {len(samples)}"
+                f"{skipped}; update it with more first, or drop these by reset()"
+            )
         movement = Demonstrations([Trajectory(samples[:, 0].copy(), samples[:, 1:].copy())])
         if self.channels is not None and is_plain(self.channels):  # converted already, and averaged since
             movement = Demonstrations.of_movements(replace(movement.movements, channels=self.channels))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from kineme.errors import DataError, KinemeError
 from kineme.io.reading.formats import FORMATS
 from kineme.io.reading.merge_files import Recordings
 from kineme.io.reading.recordings import read_recordings
-from kineme.io.tables.dialect import detect_dialect, is_number, split
+from kineme.io.tables.dialect import detect_dialect, numbers_in, split
 from kineme.io.tables.text_table import export_head, lines_of
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.detect import unit_of
@@ -56,11 +55,11 @@ def table_preview(path: Path) -> dict[str, Any] | None:
     numbers = [k for k, kind in enumerate(kinds) if kind == "number"]
     if len(samples) < MIN_SAMPLES or not numbers:
         return None
-    columns = {k: _values([row[k] for row in samples], dialect.decimal_comma) for k in numbers}
-    counters = {k for k in numbers if counts_samples(heads[k]) or (np.diff(columns[k]) == 1).all()}
+    columns = {k: numbers_in([row[k] for row in samples], dialect.decimal_comma) for k in numbers}
+    counters = {k for k in numbers if counts_samples(heads[k], heads) or (np.diff(columns[k]) == 1).all()}
     time, positions = None, [k for k in numbers if k not in counters]
     with suppress(DataError):
-        roles = choose_roles(heads, kinds, Layout(), dialect.named)
+        roles = choose_roles(heads, kinds, Layout(), dialect.named, columns.get)
         if dialect.named:
             time, positions = roles.time, list(roles.positions)
     if time is None:
@@ -102,10 +101,6 @@ def columns_of(read: Recordings) -> list[str]:
     """Return the names of the columns, as they were recorded."""
     demos = read.demonstrations
     return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
-
-
-def _values(cells: Sequence[str], comma: bool) -> Array:
-    return np.array([float(cell.replace(",", ".")) if is_number(cell, comma) else np.nan for cell in cells])
 
 
 def _runs(values: Array) -> bool:
