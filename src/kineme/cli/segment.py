@@ -137,11 +137,12 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
 def _stale(files: list[Path], inputs: list[Path]) -> list[Path]:
     """List what an earlier cut of the same recordings left: pieces that are numbered on behind these."""
     stale: list[Path] = []
+    written = {*files}
     for path in files:
         stem, _, number = path.stem.rpartition("-")
         for k in count(int(number) + 1):
             later = path.with_name(f"{stem}-{k:03d}{path.suffix}")
-            if later in files or not later.is_file() or any(later.samefile(each) for each in inputs if each.exists()):
+            if later in written or not later.is_file() or any(later.samefile(each) for each in inputs if each.exists()):
                 break
             stale.append(later)
     return stale
