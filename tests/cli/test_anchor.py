@@ -82,6 +82,11 @@ def test_what_is_rejected_is_not_proposed_again(folder, tmp_path):
 def test_what_remains_is_listed_by_the_numbers_that_the_next_call_takes(folder, tmp_path):
     options = "-l", folder, "--method", "spectral", "--no-join", "--pictures", tmp_path / "p"
     first = answer("anchor", *options)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "all.png").write_text("mine")
+    refused = run("anchor", *options, "--accept", "1", "--pictures", tmp_path / "mine")
+    assert (refused.returncode, (tmp_path / "mine" / "all.png").read_text()) == (2, "mine")
+    assert "choose another folder with --pictures" in refused.stderr
     done = run("anchor", *options, "--accept", "1")
     assert "3 proposals, 0 movements left over; the proposals that remain have new numbers" in done.stdout
     assert not (tmp_path / "p" / "proposal-4.png").exists()

@@ -162,10 +162,16 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
 
     if not len(proposals):
         return []
+    overview = folder / "all.png"
+    if overview.exists() and not (folder / "proposal-1.png").exists():
+        raise click.UsageError(
+            f"expected a folder without other pictures, {printable(overview)} is there, not of an earlier run; choose "
+            "another folder with --pictures"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     movements = library.movements(ids=proposals.ids)
     like = library.specification.comparison
-    paths = [save_figure(draw_proposals(movements, proposals.by_position, like), folder / "all.png")]
+    paths = [save_figure(draw_proposals(movements, proposals.by_position, like), overview)]
     for number, proposal in enumerate(proposals.by_position.proposals, 1):
         paths.append(save_figure(draw_proposal(movements, proposal, like=like), folder / f"proposal-{number}.png"))
     number = len(proposals) + 1
