@@ -168,6 +168,19 @@ def test_what_a_person_changes_in_the_pddl_survives(domain):
     assert str(plan.steps[-1]) == "(stir cup)"
 
 
+@pytest.mark.parametrize(
+    ("goal", "got"),
+    [
+        ("sweet cup", "words outside, as 'sweet cup'"),
+        ("", "0 expressions"),
+        ("(sweet cup) (sweet mug)", "2 expressions"),
+    ],
+)
+def test_a_goal_without_its_parentheses_is_refused_with_an_example(domain, goal, got):
+    with pytest.raises(DataError, match=re.escape(f"as (sweet cup) or (and (sweet cup) (not (full cup))), got {got}")):
+        problem_of(domain, tea.now(), goal)
+
+
 def test_changes_that_fit_no_operator_are_refused(domain):
     text = domain_to_pddl(domain)
     for wrong, message in (

@@ -153,7 +153,13 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
                 return f"{name} does not take it"
             result = engine.solve(task, timeout=timeout, output_stream=log)
     except UPNoRequestedEngineAvailableException:
-        return f"there is no engine {planner}, but {', '.join(get_environment().factory.engines)}"
+        if planner is None:
+            return "there is no engine that takes it"
+        factory = get_environment().factory
+        names = [name for name in factory.engines if factory.engine(name).is_oneshot_planner()]
+        raise DataError(
+            f"expected the name of a planner that is installed, one of {', '.join(names)}, got {planner!r}"
+        ) from None
     except UPException as error:
         return f"{error}".partition("\n")[0]
     if result.plan is None:
