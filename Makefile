@@ -9,7 +9,7 @@
 # make soak   faults of the action library, many times, and all tests with all that make test leaves out: an hour
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
-# make evaluate  recognition beside its rivals, in out/
+# make evaluate  recognition beside its rivals, in out/evaluation/
 # make figures  the pictures of docs/
 # make docs   the whole site, in out/docs/index.html, without network; GALLERY=0 does not run the examples
 # make check-docs   that site in a browser: its search, widths, accessibility
@@ -154,7 +154,7 @@ bench: .venv-bench/ready
 	touch $@
 
 evaluate: .venv-rivals/ready
-	.venv-rivals/bin/kineme evaluate lasa --out out/
+	.venv-rivals/bin/kineme evaluate lasa --out out/evaluation/
 
 .venv-rivals/ready: experiments/rivals.txt pyproject.toml .venv-rivals/python
 	$(call environment,.venv-rivals,experiments/rivals.txt)

@@ -1,6 +1,7 @@
 """Write the tables of results into the pages, from the files of the benchmark and the evaluation: ``make tables``.
 
-``python -m result_tables lasa=out/evaluation.json`` (in experiments/) takes in the results of an evaluation first.
+``python -m result_tables lasa=out/evaluation/evaluation.json`` (in experiments/) takes in the results of an evaluation
+first.
 """
 
 from __future__ import annotations

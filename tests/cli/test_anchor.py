@@ -74,8 +74,27 @@ def test_what_is_rejected_is_not_proposed_again(folder, tmp_path):
     gone = first["proposals"][1]["movements"]
     again = answer("anchor", "-l", folder, "--pictures", tmp_path / "p")
     assert len(again["proposals"]) == 3
+    assert again["proposals"] == first["remaining"]
     assert set(gone) <= set(again["left_over"])
     assert not (tmp_path / "p" / "proposal-4.png").exists()  # a picture of a number that there is no more
+
+
+def test_what_remains_is_listed_by_the_numbers_that_the_next_call_takes(folder, tmp_path):
+    options = "-l", folder, "--method", "spectral", "--no-join", "--pictures", tmp_path / "p"
+    first = answer("anchor", *options)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "all.png").write_text("mine")
+    refused = run("anchor", *options, "--accept", "1", "--pictures", tmp_path / "mine")
+    assert (refused.returncode, (tmp_path / "mine" / "all.png").read_text()) == (2, "mine")
+    assert "choose another folder with --pictures" in refused.stderr
+    done = run("anchor", *options, "--accept", "1")
+    assert "3 proposals, 0 movements left over; the proposals that remain have new numbers" in done.stdout
+    assert not (tmp_path / "p" / "proposal-4.png").exists()
+    second = answer("anchor", *options, "--accept", "1")
+    assert second["proposals"][0]["movements"] == first["proposals"][1]["movements"]
+    assert [each["movements"] for each in second["proposals"][1:]] == [
+        each["movements"] for each in second["remaining"]
+    ]
 
 
 def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):

@@ -10,6 +10,7 @@ from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
 from kineme.io.writing.write_movement import write_movement
 from kineme_experiments.evaluation.methods import METHODS
 from kineme_experiments.evaluation.protocols import PROTOCOLS
+from kineme_experiments.paper.run import Reproduction
 
 
 def run(*arguments, by=commands.run):
@@ -157,10 +158,34 @@ def test_several_data_sets_have_a_folder_each_and_a_table_and_a_diagram_together
 def test_an_old_diagram_does_not_stay_beside_new_results(archives, tmp_path):
     (tmp_path / "ranks.png").write_bytes(b"old")
     arguments = ["--method", "kineme", "--protocol", "user-dependent", "--splits", 1, "--shots", 1, "--jobs", 1]
-    done = run(archives / "plane.npz", *arguments, "--out", tmp_path)
+    done = run(archives / "plane.npz", *arguments, "--out", tmp_path, "--force")
     assert done.returncode == 0, done.stderr
     assert "Ranks need at least 3 methods" in done.stdout
     assert not (tmp_path / "ranks.png").exists()
+
+
+def test_files_of_others_are_not_written_over_and_own_ones_are(tmp_path, monkeypatch):
+    """Each command knows its own results, and those of the other are as foreign as a file of the user."""
+    done = []
+    monkeypatch.setattr("kineme_experiments.paper.run.reproduce", lambda *_: done.append(1) or Reproduction([], []))
+    monkeypatch.setattr("kineme_experiments.evaluation.data.load_data", lambda *_: done.append(1) or 1 / 0)
+    for name, content, command in (
+        ("results.csv", "my precious", "evaluate"),
+        ("results.json", '{"draw_by_draw": {}}', "evaluate"),
+        ("results.json", '{"rows": []}', "reproduce"),
+        ("results.json", "[", "reproduce"),
+        ("figure-01.png", "mine", "reproduce"),
+    ):
+        out = tmp_path / f"{command}-{len(content)}"
+        out.mkdir()
+        (out / name).write_text(content)
+        refused = commands.run(command, *["lasa"] * (command == "evaluate"), "--out", out)
+        assert (refused.returncode, done) == (2, [])
+        assert f"{name} is there and not of an earlier run; choose another folder with --out" in refused.stderr
+    assert commands.run("reproduce", "--out", out, "--force").returncode == 0
+    (out / "results.json").write_text('{"draw_by_draw": {}}')
+    assert commands.run("reproduce", "--out", out).returncode == 0
+    assert len(done) == 2
 
 
 def test_data_sets_of_one_name_are_numbered(archives, tmp_path):

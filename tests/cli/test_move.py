@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import kineme
 from arm_samples import standing
 from kineme.cli import main
+
+ROOT = Path(__file__).parents[2]
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -37,6 +43,25 @@ def test_joints_are_written_with_their_names_and_the_gripper_steps(wave):
     gripper = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[:, 8]
     assert set(gripper) == {0.0, 1.0}
     assert np.count_nonzero(np.diff(gripper)) == 1
+
+
+def test_examples_of_pages_and_of_the_help_pass_with_the_wave_of_the_tutorial(tmp_path, monkeypatch):
+    sines = [replace(one, positions=one.positions[::5] / 100 + [0.5, 0.0], times=one.times[::5])
+             for one in kineme.load_lasa(["Sine"])[:5]]  # fmt: skip
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(sines, labels=["wave"] * 5)
+    pages = [
+        path.read_text() for path in (ROOT / "README.md", ROOT / "docs" / "index.md", *ROOT.glob("docs/guide/*.md"))
+    ]
+    pages.append(main.commands["move"].help)
+    examples = {
+        match for page in pages for match in re.findall(r"kineme move (wave .*--robot panda( --[agls].*?)?) -o", page)
+    }
+    assert len(examples) == 3
+    monkeypatch.chdir(tmp_path)
+    for words, _ in examples:
+        result = run(*words.split())
+        assert result.exit_code == 0, f"{words}: {result.output[:300]}"
 
 
 def test_what_fails_a_check_is_not_written_without_force(wave):

@@ -96,6 +96,16 @@ def test_options_of_recordings_are_refused_beside_a_symbol(placing):
         assert f"say {option[0]} to kineme learn" in done.output
 
 
+def test_a_file_beside_a_library_is_refused_with_the_option(placing):
+    (placing / "a.csv").write_text("t,x\n")
+    for command in ("generate", "export", "move"):
+        done = CliRunner().invoke(main, [command, str(placing / "a.csv"), "--library", str(placing / "actions"),
+                                         *(["--c", str(placing / "a.h")] if command == "export" else []),
+                                         *(["--robot", "so101"] if command == "move" else [])])  # fmt: skip
+        assert done.exit_code == 2
+        assert "leave --library out for a recording" in done.output
+
+
 def test_the_task_is_the_name_of_the_symbol(tmp_path):
     u = np.linspace(0, 1, 100)
     for k in range(3):

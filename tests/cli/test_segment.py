@@ -41,6 +41,11 @@ def test_pandas_reads_each_piece_with_the_columns_of_the_recording(recording, tm
 def test_a_folder_of_pieces_is_learned_again(recording, tmp_path):
     run("segment", recording, "-o", tmp_path / "pieces")
     assert answer("learn", tmp_path / "pieces", "-l", tmp_path / "actions")["added"] == 3
+    for other in ("long-005.csv", "long-1-004.csv"):  # of something else
+        (tmp_path / "pieces" / other).write_text("mine")
+    run("segment", recording, "-o", tmp_path / "pieces", "--min-rest", 1.2, "--force")
+    left = sorted(path.name for path in (tmp_path / "pieces").iterdir())
+    assert left == ["long-001.csv", "long-002.csv", "long-005.csv", "long-1-004.csv"]
 
 
 def test_several_recordings_and_a_picture(recording, tmp_path):

@@ -17,7 +17,7 @@ from kineme.library.annotate import check_symbols
 from kineme.library.storage import changes, symbols
 
 N = 12
-NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é", "\n\t", "$(reboot)", "%s", "名"]
+NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é", "a\n\tb", "$(reboot)", "%s", "名"]
 
 
 @pytest.fixture
@@ -158,15 +158,15 @@ def test_any_text_is_a_name_and_only_a_name(library, name, place, tmp_path):
     assert sorted(path.name for path in tmp_path.rglob("*.sqlite")) == ["library.sqlite"] * (place == library.folder)
 
 
-TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1)
+TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1).filter(str.strip)
 
 
 @pytest.mark.filterwarnings("ignore:a symbol named")  # ? and -
 @given(names=st.lists(TEXT, min_size=30, max_size=30))
-def test_names_come_back_as_they_were_given_but_composed(tmp_path_factory, names):
+def test_names_come_back_as_they_were_given_but_composed_and_without_blanks_around(tmp_path_factory, names):
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(draw_movements(30, n_samples=8), labels=names)
-        names = [normalize("NFC", name) for name in names]
+        names = [normalize("NFC", name).strip() for name in names]
         assert {symbol.name for symbol in library.symbols()} == set(names)
         assert [library.movements(ids=[i + 1])[0].label for i in range(30)] == names
 
@@ -180,6 +180,17 @@ def test_one_name_in_two_forms_of_unicode_is_one_symbol(library):
     assert library.groups().tolist()[-2:] == [composed] * 2
     assert library[decomposed].id == library[composed].id
     assert check_symbols(library.store, [decomposed]) == [composed]
+
+
+def test_a_name_is_without_the_blanks_around_it(library):
+    library.rename("wave", " lead\t")
+    library.learn(draw_movements(2, seed=9), labels=["lead", " lead"], groups=["ann ", "ann"])
+    library.assign([int(library["nod"].members[0])], "\u00a0lead ")
+    assert [symbol.name for symbol in library.symbols()] == ["bow", "lead", "nod"]
+    assert library.groups().tolist()[-2:] == ["ann"] * 2
+    assert len(library[" lead"]) == len(library["lead"])
+    with pytest.raises(SpecificationError, match="that is no blank, got"):
+        library.rename("bow", "  ")
 
 
 def test_a_decomposed_name_of_an_earlier_library_is_found(library, monkeypatch):
@@ -280,9 +291,9 @@ def test_history_says_what_was_done(library):
         (lambda it: it["wafe"], r"expected the name or id of a symbol, got 'wafe'; there are 3, such as 'wave'"),
         (lambda it: it["\ud800"], r"expected the name or id of a symbol, got '\\ud800'"),
         (lambda it: it.rename("wave", "nod"), r"expected a name that no symbol has, got 'nod'; merge the two"),
-        (lambda it: it.rename("wave", ""), r"expected a name of at least one character, got ''"),
+        (lambda it: it.rename("wave", ""), r"expected a name of at least one character that is no blank, got ''"),
         (lambda it: it.rename("wave", "a\0"), r"expected a name without the character U\+0000, got 'a\\x00'"),
-        (lambda it: it.rename("wave", 5), r"expected a name of at least one character, got 5"),
+        (lambda it: it.rename("wave", 5), r"expected a name of at least one character that is no blank, got 5"),
         (lambda it: it.split("wave", [1, 2], "x"), r"expected movements of 'wave', got 2, which is not one of them"),
         (lambda it: it.split("wave", [1], "nod"), r"expected a name that no symbol has, got 'nod'"),
         (lambda it: it.merge("wave", "x"), r"expected a list of symbols to merge, got 'wave'"),

@@ -22,6 +22,7 @@ from library_samples import contents, draw_movements
 
 from kineme import ActionLibrary
 from kineme.errors import DataError
+from kineme.library import commit
 from kineme.library.storage import connection, store
 from kineme.library.storage.connection import FILE
 
@@ -142,6 +143,23 @@ def test_two_writers_of_the_same_movements_store_them_once(tmp_path):
         assert sum(added) == len(library) == 160
         assert sorted(len(symbol) for symbol in library.symbols()) == [80, 80]
         assert library.verify() == []
+
+
+def test_what_another_writer_learned_meanwhile_is_no_version_of_its_own(tmp_path, monkeypatch):
+    movements, serialize = draw_movements(4, labels=["a"] * 4), commit.serialize_new
+    with ActionLibrary(tmp_path, create=True) as library, ActionLibrary(tmp_path) as other:
+
+        def overtaken(*arguments):
+            monkeypatch.setattr(commit, "serialize_new", serialize)
+            other.learn(movements)
+            serialize(*arguments)
+
+        monkeypatch.setattr(commit, "serialize_new", overtaken)
+        report = library.learn(movements)
+        assert (report.added, report.duplicates, report.ids.tolist()) == (0, 4, [1, 2, 3, 4])
+        assert len(library.history()) == 1
+        library.undo()
+        assert not len(library)
 
 
 def test_readers_see_whole_versions_while_another_one_writes(tmp_path):

@@ -123,6 +123,9 @@ def test_a_plan_survives_json_and_one_that_was_changed_is_refused(plan):
         lambda data: data["steps"].pop(0),
         lambda data: data["steps"][2]["arguments"].update(to="jar"),
         lambda data: data["places"].update(cup=[5.0, 5.0]),
+        lambda data: data["steps"][0].update(goal=[0.3, 0.4]),
+        lambda data: data["steps"][0].update(goal=[0.3]),
+        lambda data: data["steps"][0].update(duration=-5),
         lambda data: data["goal"].append({"fact": ["sweet", "jar"], "value": True}),
         lambda data: data["steps"][0].update(operator="fly"),
         lambda data: data.pop("domain"),
@@ -163,6 +166,19 @@ def test_what_a_person_changes_in_the_pddl_survives(domain):
     assert edits_in(domain_to_pddl(again, "tea"), again) == []
     plan = find_plan(problem_of(again, tea.now(), "(served cup)"))
     assert str(plan.steps[-1]) == "(stir cup)"
+
+
+@pytest.mark.parametrize(
+    ("goal", "got"),
+    [
+        ("sweet cup", "words outside, as 'sweet cup'"),
+        ("", "0 expressions"),
+        ("(sweet cup) (sweet mug)", "2 expressions"),
+    ],
+)
+def test_a_goal_without_its_parentheses_is_refused_with_an_example(domain, goal, got):
+    with pytest.raises(DataError, match=re.escape(f"as (sweet cup) or (and (sweet cup) (not (full cup))), got {got}")):
+        problem_of(domain, tea.now(), goal)
 
 
 def test_changes_that_fit_no_operator_are_refused(domain):

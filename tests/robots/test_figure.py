@@ -22,3 +22,15 @@ def test_a_joint_that_stands_is_drawn_as_a_straight_line():
     for row, lower, upper in zip(rows, robot.lower, robot.upper, strict=True):
         low, high = row.get_ylim()
         assert high - low >= 0.05 * (upper - lower) - 1e-9
+
+
+def test_names_of_the_axes_of_a_flat_path_lie_beside_their_numbers():
+    (sine,) = kineme.load_lasa(["Sine"])[:1]
+    flat = kineme.Trajectory(sine.times[::5], sine.positions[::5] / 100 + [0.5, 0.0])
+    figure = draw_robot_movement(move(flat, load("panda"), timing="slowed"))
+    figure.draw_without_rendering()
+    (box,) = [axes for axes in figure.axes if axes.name == "3d"]
+    name = box.xaxis.label.get_window_extent()
+    numbers = [tick.label1 for tick in box.xaxis.majorTicks]
+    assert len(numbers) > 2
+    assert not [label.get_text() for label in numbers if label.get_window_extent().overlaps(name)]

@@ -10,6 +10,7 @@ import pytest
 
 import kineme
 from kineme.errors import DataError, SpecificationError
+from kineme.io.inspection.inspect import inspect
 from kineme.io.lerobot import write_episode as module
 from kineme.io.lerobot.write_episode import merged_statistics, statistics_of
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -155,6 +156,10 @@ def test_joints_have_the_names_and_units_that_drivers_take(tmp_path):
         assert state["units"] == [units, "m", units, None]
         last = np.vstack(rows(tmp_path / units)["observation.state"])[-1]
         np.testing.assert_allclose(last[:3], one.positions[-1] * [size, 1, size], rtol=1e-6)
+        notes = inspect(kineme.read_recordings(tmp_path / units)).notes
+        assert [note for note in notes if "declare" in note] == [
+            "LeRobot does not declare the units of grip: they are taken as they are stored"
+        ]
     with pytest.raises(SpecificationError, match="expected the robot of the trajectory, with limits of every joint"):
         write_lerobot(tmp_path / "percent", one, "x", 30, joint_units="percent")
     with pytest.raises(DataError, match=r"they differ in action, observation\.state"):

@@ -15,7 +15,7 @@ SHOWN = 5  # demonstrations of each letter that the library gets; the others are
 
 #: Names that would do harm if they were read as markup, as code or as an address.
 HOSTILE = (
-    "<img src=x onerror=alert(1)> ",
+    "<img src=x onerror=alert(1)>",
     '"><script>alert(1)</script>',
     "javascript:alert(1)",
     "\u202eevil",

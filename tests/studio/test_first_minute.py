@@ -170,6 +170,14 @@ def test_yes_teaches_the_library_and_why_shows_what_python_says(opened, examples
     assert f"{100 * explained.nearest.differences.max():.0f} % of its size" in captions[0]
 
 
+#: What another tab does to a symbol.
+RENAME = """async (name) => {
+  const { symbolNamed } = await import("/parts/library_state.js");
+  const { post } = await import("/parts/api.js");
+  await post(`/api/library/symbols/${symbolNamed(name).id}/rename`, { name: "another" });
+}"""
+
+
 def test_what_is_taken_back_is_asked_again(opened, examples, tmp_path):
     page = opened(copytree(examples / "letters", tmp_path / "own"))
     draw(page, strokes("C"))
@@ -182,6 +190,16 @@ def test_what_is_taken_back_is_asked_again(opened, examples, tmp_path):
     page.click("text=Yes, it is C")
     wait_for_text(page, "#verdict-kind", "Learned")
     wait_until(page, "document.getElementById('library-count').textContent === '10 symbols, 71 movements'")
+    draw(page, strokes("C"))
+    wait_until(page, f"{ANSWERED} && document.activeElement.id === 'naming-name'")
+    page.keyboard.type("a")
+    page.keyboard.press("Control+z")  # takes back the letter alone
+    assert page.input_value("#naming-name") == ""
+    assert page.inner_text("#library-count") == "10 symbols, 71 movements"
+    page.keyboard.press("Control+z")
+    wait_until(page, "document.getElementById('library-count').textContent === '10 symbols, 70 movements'")
+    page.evaluate(RENAME, "C")
+    wait_until(page, "document.getElementById('chips').textContent.startsWith('Yes, it is another')")
 
 
 def test_the_page_explains_as_python_does(opened, pages, examples):

@@ -62,26 +62,22 @@ _CHOICE = Parsed("1,2,...|all", _choice)
 def anchor(folder: Any, **options: Any) -> None:
     """Propose symbols among the unlabeled movements, and accept them.
 
-    On a terminal it asks about each proposal. With --accept or --reject it does not ask. Otherwise it changes nothing
-    and lists the proposals by the numbers that --accept takes.
+    On a terminal it asks about each proposal. With --accept or --reject it does not ask, and lists the proposals that
+    remain: they have new numbers then. Otherwise it changes nothing and lists the proposals by the numbers that
+    --accept takes.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     import numpy as np
 
-    from kineme.library.proposals import Recognized, assign_recognized, propose, recognized
+    from kineme.library.proposals import assign_recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
     names = _names(options["names"])
     writes = scripted or interactive
     with opened(folder, read_only=not writes) as library:
-        # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
-        # listed and when it is accepted.
-        joining = recognized(library.store) if options["join"] else Recognized()
-        proposals = propose(
-            library.store, None, options["method"], options["clusters"], options["min_members"], joining
-        )
+        joining, proposals = _proposed(library, options)
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
         if both := set(accepted) & set(rejected):
@@ -94,11 +90,7 @@ def anchor(folder: Any, **options: Any) -> None:
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
         }
-        alone, ids = "", proposals.left_over  # names of the first movements that are left over
-        if len(ids):
-            shown = library.movements(ids=ids[:_SHOWN]).names or ()
-            words = [printable(name or key) for name, key in zip(shown, ids.tolist(), strict=False)]
-            alone = ": " + ", ".join([*words, *(["..."] if len(ids) > _SHOWN else [])])
+        alone = _alone(library, proposals)
         if interactive:
             write(_text(data, alone))
             Session(library, proposals, pictures[1:]).run()
@@ -114,7 +106,33 @@ def anchor(folder: Any, **options: Any) -> None:
         for number in rejected:
             library.reject(proposals[number - 1])
         data["rejected"] = rejected
-    say(options["as_json"], data, lambda: _text(data, alone))
+        shown = data
+        joining, remaining = _proposed(library, options) if scripted else (joining, proposals)
+        if scripted and len(remaining.ids):
+            data["remaining"] = _as_data(remaining)["proposals"]
+            data["pictures"] = [str(path) for path in _draw(library, remaining, options["pictures"])]
+            would_join = {name: len(ids) for name, ids in joining.ids.items()}
+            shown, alone = data | _as_data(remaining) | {"would_join": would_join}, _alone(library, remaining)
+    say(options["as_json"], data, lambda: _text(shown, alone))
+
+
+def _proposed(library: Any, options: dict[str, Any]) -> tuple[Any, Any]:
+    """Return movements that join a symbol, and proposals among the others: listed and accepted by the same numbers."""
+    from kineme.library.proposals import Recognized, propose, recognized
+
+    joining = recognized(library.store) if options["join"] else Recognized()
+    how = options["method"], options["clusters"], options["min_members"]
+    return joining, propose(library.store, None, *how, joining)
+
+
+def _alone(library: Any, proposals: Any) -> str:
+    """Name the first movements that are left over."""
+    ids = proposals.left_over
+    if not len(ids):
+        return ""
+    shown = library.movements(ids=ids[:_SHOWN]).names or ()
+    words = [printable(name or key) for name, key in zip(shown, ids.tolist(), strict=False)]
+    return ": " + ", ".join([*words, *(["..."] if len(ids) > _SHOWN else [])])
 
 
 def _names(path: Path | None) -> dict[int, str]:
@@ -144,10 +162,16 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
 
     if not len(proposals):
         return []
+    overview = folder / "all.png"
+    if overview.exists() and not (folder / "proposal-1.png").exists():
+        raise click.UsageError(
+            f"expected a folder without other pictures, {printable(overview)} is there, not of an earlier run; choose "
+            "another folder with --pictures"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     movements = library.movements(ids=proposals.ids)
     like = library.specification.comparison
-    paths = [save_figure(draw_proposals(movements, proposals.by_position, like), folder / "all.png")]
+    paths = [save_figure(draw_proposals(movements, proposals.by_position, like), overview)]
     for number, proposal in enumerate(proposals.by_position.proposals, 1):
         paths.append(save_figure(draw_proposal(movements, proposal, like=like), folder / f"proposal-{number}.png"))
     number = len(proposals) + 1
@@ -196,6 +220,8 @@ def _text(data: dict[str, Any], alone: str) -> str:
     heads: tuple[str, ...] = ("number", "movements", "stability", "cohesion", "most like", "proposed name")
     n_columns = len(heads) if any(proposal["name"] for proposal in proposals) else len(heads) - 1
     title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
+    if data.get("remaining"):
+        title += "; the proposals that remain have new numbers, also in the pictures"
     if not (lines or rows or data["left_over"]):
         title = "no unlabeled movements"
     lines.append(table(heads[:n_columns], [row[:n_columns] for row in rows], title) if rows else title)

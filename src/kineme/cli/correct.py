@@ -52,9 +52,10 @@ def correct(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
         before = (
             read_labels(annotated) if annotated is not None else _annotated(recordings, parsed, library, error_rate)
         )
-        corrections = corrections_of(parsed, table_of, before)
+        root = root_of(*recordings)
+        corrections = corrections_of(parsed, table_of, before, root)
         symbols, version = {symbol.name for symbol in library.symbols()}, library.version
-        report = learn_corrections(library.store, parsed, corrections, options, root_of(*recordings), dry_run)
+        report = learn_corrections(library.store, parsed, corrections, options, root, dry_run)
         learned = [change for change in corrections.changes if change.learned]
         data = {
             "changes": [

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.cli.options import FOLDER, GroupedCommand, given_options, whole
+from kineme.cli.options import FOLDER, GroupedCommand, force_option, given_options, whole
 from kineme.cli.output import progress, write
 from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
+from kineme.reporting.text import printable
 
 # The names of the tables in kineme_experiments.evaluation, written out so that --help loads nothing; a test compares
 # them.
@@ -22,6 +25,9 @@ METHOD_NAMES = (
     "kineme", "paper", "paper-bio", "euclidean", "dtw", "dtw-path", "gak-svm", "minirocket", "point-cloud",
     "plus-cloud", "quick-cloud", "hmm",
 )  # fmt: skip
+#: Files that the commands write; those of an earlier run are replaced.
+_EVALUATED = ("evaluation.html", "evaluation.json", "results.csv", "results.json", "ranks.png")
+_REPRODUCED = ("report.html", "results.json", "tables.txt", "figure-*.*")
 _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 
 
@@ -42,13 +48,14 @@ _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 )
 @click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of splits and perturbations.")
 @click.option("--jobs", type=whole(1), default=None, help="Number of processes.  [default: one per processor]")
-@click.option("--out", type=FOLDER, default="out", show_default=True,
+@click.option("--out", type=FOLDER, default="out/evaluation", show_default=True,
               help="Folder for evaluation.html and evaluation.json of each data set, and results.csv, results.json and "
               "ranks.png of all.")  # fmt: skip
 @click.option(
     "--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm, hmm and dtw-path."
 )
 @layout_options
+@force_option
 def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
     """Evaluate recognition on DATA: lasa, lasa-letters, a folder of recordings, or a file.
 
@@ -68,6 +75,7 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     from kineme_experiments.evaluation.trials import Settings
 
     quick, out = options["quick"], options["out"]
+    _check_own(out, _EVALUATED, "rows", options["force"])
     contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
     splits = min(options["splits"], _QUICK_SPLITS) if quick else options["splits"]
     settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
@@ -88,6 +96,19 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     ranks = summarize([data_set.name for data_set in sets], evaluations, out).ranks
     write(ranks if isinstance(ranks, str) else to_text(ranks))
     write(f"\nopen {evaluations[0].files[0]}")
+
+
+def _check_own(out: Path, patterns: tuple[str, ...], key: str, force: bool) -> None:
+    """Refuse a folder with such files of others: beside those of an earlier run are results that have the `key`."""
+    there = [path for pattern in patterns for path in sorted(out.glob(pattern))]
+    results: Any = None
+    with suppress(OSError, ValueError, RecursionError):
+        results = json.loads((out / "results.json").read_bytes())
+    if there and not force and not (isinstance(results, dict) and key in results):
+        raise click.UsageError(
+            f"expected a folder without other results, {printable(there[0])} is there and not of an earlier run; "
+            "choose another folder with --out, or write over it with --force"
+        )
 
 
 def _numbered(sets: list[Any]) -> list[Any]:
@@ -120,7 +141,8 @@ def _print(name: str, evaluation: Any) -> None:
               help="Random draws of three demonstrations per shape.  [default: 12, with --quick 3]")  # fmt: skip
 @click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of the draws.")
 @click.option("--quick", is_flag=True, help="Fewer draws, coarse pictures, no SVM on the 26 shapes.")
-def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
+@force_option
+def reproduce(out: Path, draws: int | None, seed: int, quick: bool, force: bool) -> None:
     """Reproduce the paper on the LASA handwriting recordings.
 
     Prints Tables 1 to 4 beside the paper's numbers, what explains them, and the same on all 26 shapes; draws
@@ -128,6 +150,7 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     """
     from kineme_experiments.paper.run import reproduce as run
 
+    _check_own(out, _REPRODUCED, "draw_by_draw", force)
     result = run(out, draws or (3 if quick else 12), seed, quick, partial(_watched, "reproducing"))
     from kineme.reporting.table import to_text
 

@@ -76,11 +76,11 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
     if output is not None:
         raise click.UsageError("expected --output with --workers, --scheduler or --shard; the library is --library")
     parsed = read(recordings, options)
+    root = root_of(*(path for path in recordings if str(path) != "-"))
     if table is not None:
         from kineme.io.reading.read_labels import labeled_pieces, read_labels
 
-        parsed = labeled_pieces(parsed, read_labels(table))
-    root = root_of(*(path for path in recordings if str(path) != "-"))
+        parsed = labeled_pieces(parsed, read_labels(table), root)
     people = _people(root, parsed, person, by_person)
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with opened(folder, create=True) as library:

@@ -92,7 +92,7 @@ def rename(actions: Any, symbol: str, name: str) -> _Answer:
     key = actions[symbol].id  # a name may be another symbol's when the change is made
     version = changes.rename(actions.store, key, name)
     data = {**brief(actions[key]), "was": symbol, "version": version}
-    return data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})"
+    return data, lambda: f"{printable(symbol)} is now {printable(data['name'])} ({data['id']})"
 
 
 @_command(read_only=False)

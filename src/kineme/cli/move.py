@@ -134,7 +134,7 @@ def move(**options: Any) -> None:
     As in:
 
     \b
-    kineme move wave --library actions/ --robot panda --at 0.45,0.1,0.3 --goal 0.5,-0.2,0.4 -o wave_joints.csv
+    kineme move wave --library actions/ --robot panda --at 0.3,0.1,0.3 --goal 0.6,-0.1,0.3 -o wave_joints.csv
     kineme move wave --library actions/ --robot my_robot.urdf --tip tool0 --slow-down --ros2 wave.mcap
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.errors import heard_warnings

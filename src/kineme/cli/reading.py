@@ -244,6 +244,11 @@ def read_source(options: dict[str, Any]) -> Any:
         from kineme.library.grounding import learned_of
 
         with opened(options["folder"]) as library:
+            if source not in library and Path(source).is_file():
+                raise click.UsageError(
+                    f"expected a symbol of the library with --library, got {printable(source)}, a file; leave "
+                    "--library out for a recording or a saved primitive"
+                )
             return learned_of(library.store, source)
     from kineme.dmp.discrete.dmp import DMP
     from kineme.dmp.generation.generate import SAVED, Learned, learn_one, load_saved

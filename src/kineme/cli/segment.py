@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,8 @@ def segment(
     """Cut RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into movements.
 
     Each piece becomes a file with the columns and the time stamps of its recording, named like long-003.csv. Rests
-    belong to none. Without --output the pieces are only listed.
+    belong to none. Without --output the pieces are only listed. With --force, pieces of an earlier cut with higher
+    numbers are removed.
 
     Example: kineme segment long.csv -o pieces/ --plot pieces.png
     """
@@ -70,12 +72,15 @@ def segment(
     problems = list(map(str, parsed.problems))
     cut, movements = _cut(parsed, by, chosen, problems)
     files = _files(cut, movements, output, form)
+    inputs = paths_of(recordings, parsed)
     for path in (plot, *files):
-        check_new(path, force, *paths_of(recordings, parsed))
+        check_new(path, force, *inputs)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         for path, piece in zip(files, (piece for segmentation in cut for piece in segmentation), strict=True):
             write_movement(path, piece)
+        for path in _stale(files, inputs) if force else ():
+            path.unlink()
     if plot is not None:
         if not cut:
             raise DataError("expected recordings that can be cut, to draw them, got none")
@@ -127,6 +132,20 @@ def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str)
         for stem, segmentation in zip(stems, cut, strict=True)
         for k in range(1, len(segmentation) + 1)
     ]
+
+
+def _stale(files: list[Path], inputs: list[Path]) -> list[Path]:
+    """List what an earlier cut of the same recordings left: pieces that are numbered on behind these."""
+    stale: list[Path] = []
+    written = {*files}
+    for path in files:
+        stem, _, number = path.stem.rpartition("-")
+        for k in count(int(number) + 1):
+            later = path.with_name(f"{stem}-{k:03d}{path.suffix}")
+            if later in written or not later.is_file() or any(later.samefile(each) for each in inputs if each.exists()):
+                break
+            stale.append(later)
+    return stale
 
 
 def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[dict[str, Any]]:

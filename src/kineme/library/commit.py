@@ -61,8 +61,11 @@ def commit(store: Store, batch: Batch, continues: int | None = None) -> Committe
 
     `continues` is the version of what was learned before in the same call: an undo takes back both.
     """
-    if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
-        return Committed(0, (), ids, None)
+    if not batch.row_of:
+        with store.reading() as connection:
+            ids = _all_stored(connection, batch, find_stored(connection, batch))
+        if ids is not None:
+            return Committed(0, (), ids, None)
     for _ in range(_TRIES if store.many_write else 0):
         with suppress(ConflictError):  # others learn the same at the same time, or have failed: once more
             return _commit(store, batch, continues, _n_rows(store, batch))
@@ -89,9 +92,16 @@ def _n_rows(store: Store, batch: Batch) -> dict[str, int]:
     return counts | {"symbol": n_symbols, "symbol_state": n_symbols}
 
 
+class _NothingNewError(Exception):
+    """Nothing is left to store, since another process has learned the same meanwhile."""
+
+
 def _commit(store: Store, batch: Batch, continues: int | None, reserve: dict[str, int] | None) -> Committed:
-    with store.writing("learn", reserve=reserve) as change:
+    ids = None
+    with suppress(_NothingNewError), store.writing("learn", reserve=reserve) as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
+        if (ids := _all_stored(change.connection, batch, stored)) is not None:
+            raise _NothingNewError
         _insert_sources(change, batch, stored)
         keys, new = _keys(change.next_key("movement"), batch, stored)
         if new:
@@ -109,18 +119,18 @@ def _commit(store: Store, batch: Batch, continues: int | None, reserve: dict[str
             change.detail[CONTINUES] = continues
         for table, rows in batch.tables.items() if new else ():  # last: what others learn, too, shows before
             change.insert(table, [(key, *rows[batch.row_of[i]]) for key, i in new.items()])
+    if ids is not None:
+        return Committed(0, (), ids, None)
     return Committed(len(new), new_symbols, np.array(keys, dtype=np.int64), change.version)
 
 
-def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
+def _all_stored(connection: Database, batch: Batch, stored: Stored) -> NDArray[np.int64] | None:
     """Return the ids, if all movements are stored, with what is said of them, so that nothing changes; else None."""
-    with store.reading() as connection:
-        stored = find_stored(connection, batch)
-        keys = [stored.id_of(batch, i) for i in range(len(batch.digests))]
-        ids = [key for key in keys if key is not None]
-        if len(ids) < len(keys) or _without_symbol(connection, batch, ids) or _without_person(connection, batch, ids):
-            return None
-        return np.array(ids, dtype=np.int64)
+    keys = [stored.id_of(batch, i) for i in range(len(batch.digests))]
+    ids = [key for key in keys if key is not None]
+    if len(ids) < len(keys) or _without_symbol(connection, batch, ids) or _without_person(connection, batch, ids):
+        return None
+    return np.array(ids, dtype=np.int64)
 
 
 def _keys(key: int, batch: Batch, stored: Stored) -> tuple[list[int], dict[int, int]]:

@@ -99,16 +99,18 @@ def motions_in(path: Path) -> list[Annotation]:
     ]
 
 
-def corrections_of(recordings: Recordings, corrected: LabelTable, annotated: LabelTable) -> Corrections:
-    """Compare what a person left with what was annotated, in the recordings that `corrected` has rows of.
+def corrections_of(
+    recordings: Recordings, corrected: LabelTable, annotated: LabelTable, root: Path | None = None
+) -> Corrections:
+    """Compare what a person left with what was annotated, in the recordings below `root` that `corrected` has rows of.
 
     A stretch is as annotated if symbol and ends are the same, to one sample; others, by which shares most of the union.
     """
-    after, problems = stretches_of(recordings, corrected)
+    after, problems = stretches_of(recordings, corrected, root)
     if not after:
         first = f"; the first: {problems[0]}" if problems else ""
         raise DataError(f"expected corrections {corrected.name} of the recordings, got none{first}")
-    before = stretches_of(recordings, annotated)[0] if annotated.rows else []
+    before = stretches_of(recordings, annotated, root)[0] if annotated.rows else []
     symbols = dict.fromkeys(row.label for row in annotated.rows if row.label is not None)
     changes: list[Change] = []
     unchanged = 0

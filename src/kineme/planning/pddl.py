@@ -169,8 +169,14 @@ def parsed(text: str) -> Any:
             stack[-1].append(last)
         elif not token.startswith(";"):
             stack[-1].append(token.lower())
-    if len(stack) > 1 or len(stack[0]) != 1 or not isinstance(stack[0][0], list):
-        raise DataError("expected one expression in parentheses, got PDDL whose parentheses do not fit")
+    outside = [word for word in stack[0] if isinstance(word, str)]
+    if len(stack) > 1:
+        raise DataError("expected PDDL, got a ( without its )")
+    if len(stack[0]) != 1 or outside:
+        got = f"words outside, as {' '.join(outside)[:60]!r}" if outside else f"{len(stack[0])} expressions"
+        raise DataError(
+            f"expected one expression in parentheses, as (sweet cup) or (and (sweet cup) (not (full cup))), got {got}"
+        )
     return stack[0][0]
 
 

@@ -27,6 +27,7 @@ from kineme.validation import Array, check_form, check_number
 
 FORMAT, VERSION = "kineme-plan", 1
 _TRIED = 500  # operators with arguments that are looked at for why a goal is not reached
+_COMPUTED = ("start", "goal", "duration")  # of a step, by its places and its operator
 _DEEPEST = 6  # operators one before the other that this names
 
 
@@ -152,7 +153,13 @@ def _tried(problem: Any, compiles: bool, planner: str | None, timeout: float, lo
                 return f"{name} does not take it"
             result = engine.solve(task, timeout=timeout, output_stream=log)
     except UPNoRequestedEngineAvailableException:
-        return f"there is no engine {planner}, but {', '.join(get_environment().factory.engines)}"
+        if planner is None:
+            return "there is no engine that takes it"
+        factory = get_environment().factory
+        names = [name for name in factory.engines if factory.engine(name).is_oneshot_planner()]
+        raise DataError(
+            f"expected the name of a planner that is installed, one of {', '.join(names)}, got {planner!r}"
+        ) from None
     except UPException as error:
         return f"{error}".partition("\n")[0]
     if result.plan is None:
@@ -204,8 +211,8 @@ def plan_to_dict(plan: Plan) -> dict[str, Any]:
 def plan_from_dict(data: Any) -> Plan:
     """Return the plan of `plan_to_dict`, checked.
 
-    Raises `DataError`: anything else, or a plan of a later version. Raises `SpecificationError`: a step that cannot be
-    done; see `check_plan`.
+    Raises `DataError`: anything else, a plan of a later version, or steps that do not fit its places. Raises
+    `SpecificationError`: a step that cannot be done; see `check_plan`.
     """
     check_form(data, "plan", FORMAT, VERSION)
     try:
@@ -216,11 +223,20 @@ def plan_from_dict(data: Any) -> Plan:
         goals = tuple(Goal(tuple(map(str, each["fact"])), bool(each["value"])) for each in data["goal"])
         rows = [(domain.operator(step["operator"]), dict(step["arguments"])) for step in data["steps"]]
         steps = tuple(step_of(operator, arguments, places) for operator, arguments in rows)
+        told = [{name: np.array(each[name], float) for name in _COMPUTED if name in each} for each in data["steps"]]
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(
             f"expected a complete plan, got one that does not fit ({type(error).__name__}: {error})"
         ) from error
     plan = Plan(Problem(domain, places, facts, goals), steps, str(data.get("planner", "")))
+    for number, (step, values) in enumerate(zip(steps, told, strict=True), 1):
+        for name, value in values.items():
+            own = np.array(getattr(step, name))
+            if own.shape != value.shape or not np.allclose(value, own, rtol=1e-6, atol=1e-9):
+                raise DataError(
+                    f"expected the {name} {own.tolist()} of step {number} {step}, as its places and its operator say, "
+                    f"got {value.tolist()}; change places, or plan again"
+                )
     check_plan(plan)
     return plan
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme.errors import DataError, KinemeError
-from kineme.io.reading.read_labels import labeled_pieces, read_labels, seconds_of
+from kineme.io.reading.read_labels import labeled_pieces, read_labels, seconds_of, stretches_of
 from kineme.io.reading.recordings import read_recordings
 from kineme.io.writing.annotations import Annotation, write_annotations
 from kineme.library.correct import as_labels, corrections_of
@@ -231,6 +231,34 @@ def test_a_name_that_two_recordings_have_is_said_and_labels_neither(tmp_path, re
     (tmp_path / "a.csv").write_bytes((tmp_path / "s1" / "a.csv").read_bytes())
     pieces = labeled_pieces(read_recordings(tmp_path), read_labels(labels))
     assert [source.path for source in pieces.sources] == ["s1/a.csv"]  # and not the shorter a.csv
+
+
+@pytest.mark.parametrize(
+    ("rows", "labels"),
+    [
+        (["day1/s.csv wave"], []),
+        (["day1/s.csv wave", "day2/s.csv nod"], ["nod"]),
+        (["../day1/s.csv wave", "../day2/s.csv nod"], ["nod"]),
+        (["{root}/day1/s.csv wave"], []),
+        (["{root}/day1/s.csv wave", "{root}/day2/s.csv nod"], ["nod"]),
+        (["/moved/day1/s.csv wave", "/moved/day2/s.csv nod"], ["nod"]),
+        (["/moved/rest/s.csv wave"], ["wave"]),
+        (["C:/moved/s.csv wave"], ["wave"]),
+        (["/moved/rest/s.csv wave", "/moved/others/s.csv nod"], []),
+    ],
+)
+@pytest.mark.parametrize("given", ["day2/s.csv", "day2"])
+def test_rows_of_another_folder_label_no_recording_of_the_same_file_name(tmp_path, recordings, given, rows, labels):
+    for name in ("day1", "day2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "s.csv").write_bytes((tmp_path / "long.csv").read_bytes())
+    lines = [f"1000.5,1001.75,{row.format(root=tmp_path).replace(' ', ',')}" for row in rows]
+    (tmp_path / "l.csv").write_text("\n".join(["start,end,recording,label", *lines]))
+    read, table = read_recordings(tmp_path / given), read_labels(tmp_path / "l.csv")
+    stretches, problems = stretches_of(read, table, tmp_path / "day2")
+    assert [stretch.row.label for stretch in stretches] == labels
+    assert len(problems) == (len(labels) < len(rows))
+    assert all("expected a recording" in problem.what and "correct them" in problem.what for problem in problems)
 
 
 def test_clocks_count_hours():

@@ -24,6 +24,7 @@ from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.table import Table, to_text
 from kineme.reporting.text import counted, first_names, printable
+from kineme.units import split_head
 from kineme.validation import Array
 
 _FILE = "file"  # head of the names of files
@@ -151,8 +152,10 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
         notes.append(f"time counts in {' here, in '.join(guessed)} there, to judge by its size; give --units")
     if any(how.units_from.startswith("no times") for how, _ in recordings.detected):
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
-    if any(how.format.startswith("LeRobot") for how, _ in recordings.detected):
-        notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
+    heads = [head for how, _ in recordings.detected if how.format.startswith("LeRobot") for head in how.columns]
+    if silent := [head for head in heads if split_head(head)[1] is None]:
+        of = "joints" if len(silent) == len(heads) else first_names(silent, 3)
+        notes.append(f"LeRobot does not declare the units of {of}: they are taken as they are stored")
     notes += notes_on_heads(recordings)
     single = [str(summary.label) for summary in labels if summary.label is not None and summary.movements == 1]
     if single:

@@ -6,10 +6,11 @@ import csv
 import io
 import json
 import math
+import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -246,8 +247,10 @@ class Stretch(NamedTuple):
     row: LabelRow
 
 
-def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretch], list[Problem]]:
-    """Return the stretches of recordings that a table labels, and the problems with its other rows.
+def stretches_of(
+    recordings: Recordings, table: LabelTable, root: Path | None = None
+) -> tuple[list[Stretch], list[Problem]]:
+    """Return the stretches of recordings below `root` that a table labels, and the problems with its other rows.
 
     A stretch begins and ends at the samples nearest to its times. Those by the recording's clock that all lie outside
     of it, and would fit counted from its first sample, are taken so. A stretch outside of its recording, of fewer than
@@ -261,7 +264,7 @@ def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretc
         )
     stretches: list[Stretch] = []
     paths = {source.path for source in recordings.sources}
-    meant = {name: _paths_of(name, paths) if name else [] for name in dict.fromkeys(row.recording for row in rows)}
+    meant = _meant(dict.fromkeys(row.recording for row in rows), paths, root)
     # The rows of which several recordings may be meant, one problem for each name.
     lines_of_names = {row.recording: row.line for row in reversed(table.rows)}
     problems = _of_none(table, recordings.sources, meant)
@@ -300,9 +303,9 @@ def stretches_of(recordings: Recordings, table: LabelTable) -> tuple[list[Stretc
     return stretches, problems
 
 
-def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
+def labeled_pieces(recordings: Recordings, table: LabelTable, root: Path | None = None) -> Recordings:
     """Return the stretches of recordings that a table labels, see `stretches_of`, as movements of their own."""
-    stretches, problems = stretches_of(recordings, table)
+    stretches, problems = stretches_of(recordings, table, root)
     if not stretches:
         raise DataError(
             f"expected labels {table.name} within {recordings.sources[0].path}, found none"
@@ -337,16 +340,46 @@ def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, S
         return []
     wanted = f"{lost[0].recording} {lost[0].place}".strip()
     more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
-    reason = f"expected a recording {wanted} among those that are read, found none{more}"
+    alike = {PurePosixPath(source.path).name for source in sources} & {PurePosixPath(lost[0].recording).name}
+    folders = "; where its folders have other names now, correct them in the table" if alike else ""
+    reason = f"expected a recording {wanted} among those that are read, found none{more}{folders}"
     return [Problem(table.name, lost[0].line, reason)]
 
 
-def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
-    """Give the recordings that a name may mean: itself, else those in folders below, else the end of a longer path."""
-    if recording in paths:
-        return [recording]
-    below = sorted(path for path in paths if path.endswith(f"/{recording}"))
-    return below or sorted((path for path in paths if recording.endswith(f"/{path}")), key=len)[-1:]
+def _meant(names: Iterable[str], paths: Collection[str], root: Path | None) -> dict[str, list[str]]:
+    """Give the recordings that names may mean: those of the name, else in folders below, else ends of longer paths.
+
+    Of several longer paths that end in the same recording, that is meant which agrees with it most.
+    """
+    meant: dict[str, list[str]] = {"": []}
+    longer: dict[str, dict[str, float]] = {}
+    for name in filter(None, names):
+        meant[name] = [name] if name in paths else sorted(path for path in paths if path.endswith(f"/{name}"))
+        if not meant[name]:
+            agreement, path = max((_agreement(name, path, root), path) for path in paths)
+            longer.setdefault(path, {})[name] = agreement
+    for path, agreements in longer.items():
+        best = max(agreements.values())
+        if best == math.inf or (best > 0 and [*agreements.values()].count(best) == 1):
+            meant |= {name: [path] for name, agreement in agreements.items() if agreement == best}
+    return meant
+
+
+def _agreement(recording: str, path: str, root: Path | None) -> float:
+    """Return how many names at the end of a longer path are those of a recording; inf for all, and 0 if it is another.
+
+    A table may have moved with its recordings: then its paths begin at the top, and lead nowhere.
+    """
+    names = tuple(name for name in reversed(PurePosixPath(recording).parts) if name not in {"/", ".."})
+    own = PurePosixPath(path).parts[::-1]
+    if names[: len(own)] != own:
+        return 0
+    folders = [path] if root is None else [os.path.abspath(root / path), os.path.realpath(root / path)]  # also of links
+    same = max(k for k in range(len(names) + 1) for each in folders if Path(each).parts[::-1][:k] == names[:k])
+    if same == len(names):
+        return math.inf
+    moved = PureWindowsPath(recording).anchor and not os.path.exists(recording)
+    return same if root is None or moved else 0
 
 
 def _is_of(row: LabelRow, source: Source, meant: Mapping[str, Sequence[str]]) -> bool:

@@ -129,13 +129,13 @@ def _members(connection: sql.Database, keys: list[int], moment: Moment) -> dict[
 
 
 def check_name(name: Any) -> str:
-    """Return a name in its composed form (NFC), so that one that looks the same is the same.
+    """Return a name in its composed form (NFC) without blanks around it, so that one that looks the same is the same.
 
     It is any Unicode text without U+0000, which NumPy, C and shells treat as the end of a text.
     """
-    if not isinstance(name, str) or not name:
-        raise SpecificationError(f"expected a name of at least one character, got {name!r}")
-    name = normalize("NFC", name)
+    if not isinstance(name, str) or not name.strip():
+        raise SpecificationError(f"expected a name of at least one character that is no blank, got {name!r}")
+    name = normalize("NFC", name).strip()
     sql.check_text("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
@@ -156,8 +156,9 @@ def check_symbol(name: Any) -> str:
 
 
 def spellings(name: str) -> tuple[str, ...]:
-    """Return a name as it is given, composed, and decomposed, as some file systems and earlier libraries have it."""
-    return tuple(dict.fromkeys((name, normalize("NFC", name), normalize("NFD", name))))
+    """Return a name as it is given, composed, decomposed, and without blanks around it, as other places have it."""
+    forms = (name, normalize("NFC", name), normalize("NFD", name))
+    return tuple(dict.fromkeys((*forms, *map(str.strip, forms))))
 
 
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:

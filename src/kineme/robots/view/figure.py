@@ -50,9 +50,10 @@ def _draw_path(figure: Any, movement: RobotMovement) -> None:
     axes.scatter(*executed[-1], color=BLUE, s=40, marker="*", label="goal")
     set_equal_scales(axes, executed)
     extents = np.ptp(executed, axis=0)
+    is_flat = extents[2] < extents.max() / 2  # then the numbers of x and y lie lower
     for name, extent in zip("xyz", extents, strict=True):
         axes.locator_params(axis=name, nbins=4 if extent > extents.max() / 2 else 2)  # numbers side by side
-        getattr(axes, f"set_{name}label")(f"{name} [m]")
+        getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=10 if is_flat and name != "z" else None)
     figure.legend(loc="outside lower center", ncols=3)
     figure.suptitle(f"tip of {drawable(movement.robot.name)}", fontsize=9)
 

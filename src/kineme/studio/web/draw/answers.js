@@ -4,7 +4,7 @@ import { library, symbolNamed } from "../parts/library_state.js";
 import { server } from "../parts/server.js";
 import { currentView } from "../parts/views.js";
 
-const SUGGESTED = 2; // names that the movement may have
+const SUGGESTED = 2; // names that it may have
 
 /** Show what the movement is so far. @param {DrawSession} session */
 export function showState(session, state) {
@@ -63,11 +63,11 @@ export function showError(session, text) {
 /** How many movements have a name. */
 export const membersOf = (name) => (name === null ? library().unlabeled : (symbolNamed(name)?.n_members ?? 0));
 
-/** Ask again about a drawing that was learned, once that is taken back. @param {DrawSession} session */
+/** Ask again once the name is taken back. @param {DrawSession} session */
 export function reopen(session) {
-  const { learned } = session;
-  if (!learned || membersOf(learned.name) >= learned.members) return;
-  Object.assign(session, { movement: learned.movement, learned: null, pointer: "" });
+  const { label, learned, movement } = session;
+  if (learned ? membersOf(learned.name) >= learned.members : !movement || !label || symbolNamed(label)) return;
+  Object.assign(session, { movement: movement ?? learned.movement, learned: null, pointer: "" });
   if (library().symbols.length) requestAnswer(session);
   else showAnswer(session, null);
 }
@@ -79,10 +79,7 @@ function showRefusal(session, text) {
   focusName(session);
 }
 
-/**
- * Put the focus on the field of the name. With a finger it waits to be touched, as a keyboard of glass would cover the
- * drawing, and while programs move, too.
- */
+/** Focus the name: not for a finger, whose keyboard covers the drawing, nor for programs. */
 function focusName({ pointer, naming }) {
   if (!["", "touch", "program"].includes(pointer) && currentView() === "draw") naming.focus();
 }

@@ -53,8 +53,7 @@ export function startDraw(send) {
   byId("draw-replay").onclick = () => picture.replay();
   byId("draw-move").onclick = () => move(session);
   document.addEventListener("keydown", (event) => {
-    const isOurs = event.key === "Escape" && currentView() === "draw";
-    if (isOurs && !document.querySelector("dialog[open]")) clear(session);
+    if (event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]")) clear(session);
   });
   onLibrary(() => {
     showInvitation(picture.ink.length > 0);

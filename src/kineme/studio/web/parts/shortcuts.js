@@ -11,12 +11,12 @@ function list() {
 const FIELDS = "input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]";
 
 /** Whether a key is for something else: a field in which one writes, or a dialog. */
-const isTaken = ({ target }) => target.closest?.(FIELDS) || document.querySelector("dialog[open]");
+const isTaken = ({ target }, fields = FIELDS) => target.closest?.(fields) || document.querySelector("dialog[open]");
 
 const commands = (event, keys) =>
   (event.ctrlKey || event.metaKey) &&
   keys.split(" ").includes((event.shiftKey ? "Shift+" : "") + event.key.toLowerCase()) &&
-  !isTaken(event);
+  !isTaken(event, `:is(${FIELDS}):not(:placeholder-shown)`); // but an empty one
 
 /** Whether a key takes back. */
 export const isUndo = (event) => commands(event, "z");
@@ -25,12 +25,11 @@ export const isUndo = (event) => commands(event, "z");
 export const isRedo = (event) => commands(event, "Shift+z y");
 
 function pressed(event) {
-  if (isTaken(event)) return;
   if (isUndo(event)) {
     event.preventDefault();
     if (!["move", "recordings"].includes(currentView())) undo();
   }
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (isTaken(event) || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") list();
   const view = VIEWS[Number(event.key) - 1];
   if (view && event.key.trim()) show(view, true);
