@@ -67,6 +67,7 @@ EXEMPT = {
     "audit.motion.Motion.frames": "of one episode",
     "audit.motion.Motion.seconds": "of one episode",
     "recognition.answer_figure.View.points": "one picture",
+    "movements.preparation.glitches.without_jumps": "one recording by contract",
     "recognition.coarse_windows.coarse_distances": "windows of one recording by contract",
     "recognition.compared_windows.Templates.levels": "windows of one recording by contract",
     "recognition.compared_windows.Templates.level_scores": "windows of one recording by contract",

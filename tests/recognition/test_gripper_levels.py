@@ -120,7 +120,7 @@ def test_a_gripper_that_steps_is_evidence_although_it_is_not_learned():
     plain = Recognizer().fit([Trajectory(one.times, one.positions) for one in _stepped(demos)], labels)
     for one, expected in zip(recognizer.spot(alone), plain.spot(alone), strict=True):
         assert one.label == expected.label
-        assert (*one[:2], *one[3:]) == pytest.approx((*expected[:2], *expected[3:]), abs=1e-5)
+        assert (*one[:2], *one[3:]) == pytest.approx((*expected[:2], *expected[3:]), abs=1e-4)  # of single precision
 
 
 def test_a_gripper_that_never_moves_beside_one_that_does_is_no_evidence(monkeypatch):

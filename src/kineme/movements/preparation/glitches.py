@@ -67,17 +67,20 @@ def without_jumps(positions: Array, steps: Array, longest: float) -> Array:
     """Return positions (T, d) of a recording in which what follows a jump goes on where it was before the jump.
 
     A jump is a step `STEPS` times as long as those beside it, and as a typical one, of at most two among five: where
-    it leads is no movement, as a tracker that finds its origin anew or writes zeros while it sees nothing. Repeated
-    samples do not count, as of a sensor that is slower than the recording. Nor does a step in time `steps` (T - 1,)
-    above `longest`: who moves meanwhile was not seen.
+    it leads is no movement, as a tracker that finds its origin anew or writes zeros while it sees nothing. A single
+    column that jumps is one that switches, as of a gripper. Repeated samples do not count, as of a sensor that is
+    slower than the recording. Nor does a step in time `steps` (T - 1,) above `longest`: who moves meanwhile was not
+    seen.
     """
-    sizes = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    squares = np.diff(positions, axis=0) ** 2
+    sizes = np.sqrt(squares.sum(axis=1))
+    others = np.sqrt(np.maximum(squares.sum(axis=1) - squares.max(axis=1), 0.0))  # but for the column of most
     moved = np.flatnonzero(sizes > 0)
     if len(moved) < 2 * LENGTH or sizes.max() <= STEPS * np.median(sizes[moved]):
         return positions
     medians = median_filter(sizes[moved], 5, mode="constant")  # at the ends two of three may be jumps
     usual = np.maximum(maximum_filter1d(medians, 15), np.median(sizes[moved]))
-    jumps = moved[(sizes[moved] > STEPS * usual) & (steps[moved] <= longest)]
+    jumps = moved[(sizes[moved] > STEPS * usual) & (others[moved] > STEPS * usual) & (steps[moved] <= longest)]
     if not len(jumps):
         return positions
     shifts = np.zeros_like(positions)

@@ -337,8 +337,8 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     t = recording.times - recording.times[0]
     steps = np.diff(t)
     longest = _longest_step(steps)
-    positions = without_glitches(recording.positions, np.array([0, len(t)]))
-    positions = without_jumps(positions, steps, longest)
+    recorded = without_glitches(recording.positions, np.array([0, len(t)]))
+    positions = without_jumps(recorded, steps, longest)
     variance = noise_variance(positions)
     clock, gaps = np.append(0.0, np.cumsum(np.minimum(steps, longest))), np.flatnonzero(steps > longest)
     rate = (len(t) - 1) / clock[-1]
@@ -365,6 +365,8 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
             f"{who}: expected some movement, got {recording.duration:.3g} s at rest: the smoothed positions stay "
             f"within {extent:.3g}, the noise is {sigma:.3g}; check the dimensions and the unit of the recording"
         )
+    if positions is not recorded:  # only the speed is without jumps: a gripper that opens at once has another level
+        smooth = Smooth(cutoff * cycles).apply(Demonstrations([Trajectory(recording.times, recorded)])).positions
     return Motion(recording.times, clock, smooth, speed, peak, noise, cutoff, steps_of(recording))
 
 

@@ -9,7 +9,7 @@ export function uninterrupted(movement, rule) {
 }
 
 /** The movement without its pauses; the same object if it has none. @param {PauseRule} rule */
-export function withoutPauses(movement, rule) {
+function withoutPauses(movement, rule) {
   let cut = movement;
   for (let round = 0; round < rule.rounds; round++) {
     const { steps, remaining, changes } = shortened(cut, rule);
