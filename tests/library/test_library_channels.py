@@ -6,6 +6,7 @@ import json
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -88,7 +89,8 @@ def test_movements_that_differ_in_a_gripper_or_in_where_the_tool_points_are_two(
 def test_a_symbol_generates_unit_quaternions_and_the_gripper_under_their_names(library):
     options = MovementOptions(goal=np.array([1.0, 2, 3, 0, 0, 0, 1]), settle=0.01)
     generated = generate(learned_of(library.store, "a"), options)
-    assert generated.names.positions == tuple(name for channel in CHANNELS for name in channel.columns)
+    names = [[f"{name} [{channel.unit}]" if channel.unit else name for name in channel.columns] for channel in CHANNELS]
+    assert generated.names.positions == tuple(chain(*names))
     np.testing.assert_allclose(np.linalg.norm(generated.columns["positions"][:, 4:], axis=1), 1)
     np.testing.assert_allclose(generated.columns["positions"][-1, 1:4], [1, 2, 3], atol=0.05)
     assert abs(generated.columns["positions"][-1, 7]) > 0.99

@@ -205,11 +205,12 @@ def test_joints_in_what_is_no_angle_do_not_move(tmp_path, unit, message):
 def test_joints_without_a_unit_are_said_to_be_taken_as_radians(tmp_path):
     robot, u = load("panda"), np.linspace(0, 1, 20)[:, None]
     columns = np.hstack((3 * u, robot.rest + 0.1 * u))
-    for unit in ("", " [rad]"):
-        one = recorded(["time [s]", *(name + unit for name in robot.joints)], columns, tmp_path)
+    own, others = robot.joints, [f"q{k}" for k in range(1, 8)]
+    for names, unit in ((others, ""), (others, " [rad]"), (own, "")):  # ROS and the URDF have radians by these names
+        one = recorded(["time [s]", *(name + unit for name in names)], columns, tmp_path)
         learned, generated = learn_one(one, kineme.DMP()), partial(generate_at, joints=robot)
         generated(learned, joint_units="rad")
-        with pytest.warns(UserWarning, match="panda_joint7 are taken as radians") if unit == "" else nullcontext():
+        with nullcontext() if unit or names is own else pytest.warns(UserWarning, match="q7 are taken as radians"):
             generated(learned)
 
 

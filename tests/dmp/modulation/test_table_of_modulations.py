@@ -86,7 +86,7 @@ ASKED = {
     "`controller.step(goal_velocity=...)`": stepped,
     "`rollout(position_limits=...)`": lambda one: one.rollout(position_limits=(-9.0, 9.0)),
     "`controller(via=...)`": controlled,
-    "`least_duration`": fastest,
+    "`rollout().least_duration`": fastest,
     "`join`": joined,
     "`blend`": blended,
     "`couple`": lambda one: kineme.couple(one, one, during=(0.4, 0.6)),

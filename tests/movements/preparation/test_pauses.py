@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.preparation.pauses import LAST_REST, PAUSE, cut_pauses, without_pauses
+from kineme.movements.preparation.pauses import LAST_REST, PAUSE, cut_pauses, uninterrupted
 from movement_samples import draw_shapes, interrupted, stepped
 
 pauses = given(
@@ -115,9 +115,9 @@ def test_steady_movements_are_as_they_were():
 
 def test_some_of_many_movements_are_cut_as_they_are_alone():
     demos = interrupted(draw_shapes([3, 3], n_samples=80), 5.0, True, 0.0, 1)
-    every = without_pauses(demos, 0, 6)
+    every = uninterrupted(demos, 0, 6)
     for i in range(6):
-        alone, among = without_pauses(demos, i, i + 1), every[i]
+        alone, among = uninterrupted(demos, i, i + 1), every[i]
         np.testing.assert_allclose(alone[0].times, among.times, atol=1e-9)
         np.testing.assert_array_equal(alone[0].positions, among.positions)
 

@@ -130,11 +130,15 @@ def _joints(name: str, point: ArrayLike, robot: Robot, roles: Roles, scales: Sca
 
 
 def _say_radians(columns: Sequence[Channel], robot: Robot) -> None:
-    """Warn which joints are taken as radians although nothing says their unit."""
+    """Warn which joints are taken as radians although nothing says their unit.
+
+    Columns with the very names of the joints are what ROS and the URDF have: radians.
+    """
     named = [
         channel.name
         for channel, native in zip(columns, robot.units, strict=False)
         if native == "rad" and channel.unit is None and not channel.name.endswith(DRIVERS)
+        if channel.name not in robot.joints
     ]
     if named or not columns:
         warn(
