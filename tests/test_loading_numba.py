@@ -106,6 +106,7 @@ assert sys.modules["numba"].core and sys.modules["numba"].njit(lambda x: x + 1)(
 """
 
 
+@pytest.mark.soak
 def test_a_thread_that_imports_a_part_of_numba_meanwhile_breaks_nothing():
     run(SIDE_DOOR)
 

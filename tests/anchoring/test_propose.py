@@ -138,6 +138,7 @@ def test_stored_feature_rows_say_the_same(d):
     assert partition(propose(rows)) == partition(propose(demos))
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("d", [slow(1), 2])
 def test_more_movements_than_are_compared_at_once(d):
     demos = draw_kinds([60, 90, 40, 70, 3, 1], d, 5, spread=0.04)

@@ -63,6 +63,7 @@ def test_it_stores_proposals_which_anchor_accepts_by_their_names(dataset, tmp_pa
     assert "discover" in run("library", "history", "--library", tmp_path / "actions").stdout
 
 
+@pytest.mark.soak
 @pytest.mark.usefixtures("without_pictures")
 def test_movements_are_compared_where_they_are(dataset, tmp_path):
     """A way there is no way back: what was accepted is recognized, and it annotates the data set."""

@@ -63,6 +63,7 @@ def _named(truth, rows):
     return sum(right) / len(right)
 
 
+@pytest.mark.soak
 def test_a_data_set_is_annotated_the_same_whole_or_in_parts(work, monkeypatch):
     folder, truth = work
     whole = answer("annotate", folder / "set", "-l", folder / "actions")

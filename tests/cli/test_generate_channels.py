@@ -179,6 +179,7 @@ def test_short_names_of_columns_tell_them_apart():
     assert short_names(["field.pose.position.x", "y", "v."]) == ["position.x", "y", "v."]
 
 
+@pytest.mark.soak
 def test_names_of_columns_are_not_cut_off_at_the_edge(tmp_path):
     u = np.linspace(0, 2, N)
     heads = ",".join(["t", *(f"panda_joint{k + 1}" for k in range(7)), "gripper"])

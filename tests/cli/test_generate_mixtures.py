@@ -186,6 +186,7 @@ def test_what_rests_has_no_share_of_its_extent(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.soak
 def test_the_figure_has_a_path_for_each_hand_and_steps_for_a_gripper(recording):
     hands, joints = learned_from(recording, "hands"), learned_from(recording, "joints")
     assert path_columns(hands) == [[0, 1, 2], [7, 8, 9]]

@@ -98,6 +98,7 @@ def test_names_cannot_command_the_terminal(tmp_path):
     assert r"a\x1b[31m$(b)" in done.stdout
 
 
+@pytest.mark.soak
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are those of POSIX systems")
 def test_progress_is_shown_on_a_terminal(folder):
     import termios

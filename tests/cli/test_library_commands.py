@@ -37,6 +37,7 @@ def test_list_shows_symbols_and_counts(folder):
     assert listed["symbols"][0]["id"] in text
 
 
+@pytest.mark.soak
 def test_the_library_may_come_from_the_environment(folder):
     done = subprocess.run(
         [sys.executable, "-m", "kineme", "library", "list", "--json"],

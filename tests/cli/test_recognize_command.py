@@ -191,6 +191,7 @@ def test_the_shell_completes_symbols_of_the_library_on_the_line(folder):
     assert _completed("kineme library show -l nowhere N") == []
 
 
+@pytest.mark.soak
 def test_a_name_that_a_shell_would_act_on_is_completed_as_its_id(tmp_path):
     hostile = ["a;reboot", "$(reboot)", "`x`", "two words", "*", "-y", "~", "a\nplain,b", "a,b", "a'b", "!x"]
     with kineme.ActionLibrary(tmp_path / "a", create=True) as library:

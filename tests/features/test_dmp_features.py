@@ -106,6 +106,7 @@ def test_parameters_are_set_by_name(demos):
     assert features.fit_transform(demos).shape == (15, 22)
 
 
+@pytest.mark.soak
 def test_a_grid_search_over_features_formulations_and_sizes_runs(demos):
     model = Pipeline([("features", DMPFeatures()), ("classify", KNeighborsClassifier(1))])
     grid = {

@@ -299,6 +299,7 @@ def test_small_files_that_would_take_much_memory_are_refused(tmp_path):
         list(robot_episodes(tmp_path / "a.hdf5"))
 
 
+@pytest.mark.soak
 def test_one_episode_is_in_memory_at_a_time(tmp_path):
     path = write_robomimic(tmp_path / "a.hdf5", lengths=(2000,) * 12)
     tracemalloc.start()

@@ -83,6 +83,7 @@ def test_a_large_library_calibrates_people_as_the_recognizer_does(tmp_path, copi
         assert (other.scales < 0.7 * ours.scales).all()
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("alike", [slow(True), False], ids=["equally many", "nearly all by one"])
 def test_large_classes_compare_no_one_with_oneself(tmp_path, alike):
     """Also where only some of a class calibrate it, and the others are compared by their bounds."""

@@ -171,6 +171,7 @@ def test_calibration_finds_the_nearest_of_a_large_class(make, d):
     assert np.mean(to_own < nearest + 1e-4) > 0.85
 
 
+@pytest.mark.soak
 def test_calibration_holds_few_bounds_at_once(make, monkeypatch):
     """Of a million movements, the bounds of a hundred to all were two gigabytes."""
     library, together = make(_kinds([60] * 4)), []

@@ -177,6 +177,7 @@ _WAIT = (
 )
 
 
+@pytest.mark.soak
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_processes_end_with_the_one_that_has_started_them(tmp_path, monkeypatch, how):

@@ -162,6 +162,7 @@ def test_an_object_that_is_moved_is_fetched_from_where_it_is(table, look_rate, s
     assert execution.attempts[1].duration < 2 * execution.attempts[0].duration
 
 
+@pytest.mark.soak
 def test_a_hand_that_shook_goes_back_as_quickly(table):
     """What a person shows is not smooth; nearby samples of it say nothing of the way."""
     plan, world = begin(table)
@@ -490,6 +491,7 @@ def test_joined_steps_do_not_stop_between_them(plane):
     np.testing.assert_allclose(going.tips[-1], executions[False].runs[1].tips[-1], atol=2e-3)
 
 
+@pytest.mark.soak
 def test_pictures(table, tmp_path, monkeypatch):
     monkeypatch.setattr("kineme.planning.figure._MOST_FRAMES", 6)
     plan, world = begin(table)
@@ -521,6 +523,7 @@ def shell(folder, *words):
     return CliRunner().invoke(main, ["execute", *map(str, words), *options])
 
 
+@pytest.mark.soak
 def test_in_the_shell(table, folder, tmp_path):
     plan, _ = begin(table)
     path = tmp_path / "plan.json"

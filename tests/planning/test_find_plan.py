@@ -57,6 +57,7 @@ def _makes_tea(plan):
     return steps in (STEPS, [re.sub("cup|mug", lambda word: swap[word[0]], step) for step in STEPS])
 
 
+@pytest.mark.soak
 def test_two_cups_of_tea_take_eight_steps(plan):
     assert _makes_tea(plan)
     assert plan.duration == 16.0

@@ -65,6 +65,7 @@ def test_more_of_the_path_is_at_least_as_good_in_any_dimension(n_dims):
     assert scores[1] >= 0.85
 
 
+@pytest.mark.soak
 def test_half_of_the_path_of_real_movements():
     demos = kineme.load_lasa()
     demos = demos[[i for i, label in enumerate(demos.labels) if not label.startswith("Multi")]]

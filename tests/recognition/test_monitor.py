@@ -55,6 +55,7 @@ def distances(monitor, times, positions):
     return [monitor.update(t, x).distance for t, x in zip(times, positions, strict=True)]
 
 
+@pytest.mark.soak
 def test_about_the_stated_share_of_such_movements_is_called_outside():
     watching, outside = [Monitor.of(draw(39, seed), error_rate=0.1) for seed in range(4)], []
     for k, monitor in enumerate(watching):

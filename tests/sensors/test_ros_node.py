@@ -158,6 +158,7 @@ print(json.dumps([block.times.tolist() for block in node.blocks if len(block.tim
 """
 
 
+@pytest.mark.soak
 def test_a_pose_of_frames_is_composed_at_each_transform_on_the_way():
     times, row = _answer(_FRAMES, needs="tf2_msgs.msg")
     assert times == [3.0]

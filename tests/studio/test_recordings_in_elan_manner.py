@@ -66,6 +66,7 @@ def test_what_a_table_does_not_say_is_guessed_and_asked_for(shared_client, name)
     assert [(channel["name"], channel["unit"]) for channel in table["channels"]] == [(head, "mm") for head in columns]
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", ["without times", "times of another name", "a counter", "without names"])
 def test_the_command_of_the_shell_reads_the_file_as_the_studio_does(shared_client, tmp_path, name, monkeypatch, capsys):
     text, time, units, columns, _ = TABLES[name]

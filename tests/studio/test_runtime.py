@@ -357,6 +357,7 @@ def test_signals_under_way_are_recognized_as_in_python(signal):
     assert compare_states(states_of(recognizer, list(held))) <= 5 * SIMILAR
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("settings", "d"),
     [
@@ -523,7 +524,7 @@ def worst_rollouts(runtime):
     [
         worst_answers,
         worst_turned_answers,
-        worst_answers_of_points,
+        slow(worst_answers_of_points),
         worst_calibrated_answers,
         worst_states,
         worst_rollouts,

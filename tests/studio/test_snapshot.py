@@ -149,6 +149,7 @@ def test_the_prototype_of_a_symbol_moves(tmp_path):
     np.testing.assert_allclose(got["positions"], wanted, atol=1e-9)
 
 
+@pytest.mark.soak
 def test_a_hundred_symbols_are_below_two_megabytes(tmp_path):
     """Of 12 movements each as many are taken as fit; the answers are those of a library of these."""
     demos = draw_shapes([12] * 100, seed=2, n_samples=30)

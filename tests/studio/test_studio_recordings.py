@@ -116,6 +116,7 @@ def test_labels_of_a_file_are_taken(client):
     assert client.post(f"/api/recordings/{read['recording']}/learn", json={"spans": []}).status_code == 422
 
 
+@pytest.mark.soak
 def test_of_each_file_the_columns_asked_for_last_are_kept(client):
     data, _ = _table(0, 1, heads="t,a,b")
     cached, keys = client.app.state.studio.uploads._read, [_send(client, data).json()["recording"] for _ in range(2)]
@@ -363,6 +364,7 @@ def test_a_disk_that_is_full_is_said():
         _received(files, b"x")
 
 
+@pytest.mark.soak
 def test_what_was_read_is_held_up_to_a_limit_and_read_again_then(monkeypatch):
     files = uploads.Uploads(held=20_000)
     small, large = (_received(files, _table(*kinds)[0]) for kinds in ((0,), range(12)))

@@ -78,6 +78,7 @@ def test_gradients_of_densities(formulation):
     assert gradcheck(lambda *parts: mp.distribution(*parts)[1], numbers[1:], fast_mode=True)
 
 
+@pytest.mark.soak
 def test_densities_are_mapped_and_compiled_and_work_in_single_precision():
     mp = module()
     mean, chol, start, goal = _weights(3)

@@ -90,6 +90,7 @@ def test_gradients_go_through_replanning_in_its_time_too(formulation):
     assert gradcheck(flat, (weights, at, x, v, goal, start), fast_mode=True)
 
 
+@pytest.mark.soak
 def test_replanning_is_mapped_and_compiled():
     mp = module()
     weights, x, v, goal = tensors((3, 2, 6), (3, 2), (3, 2), (3, 2))

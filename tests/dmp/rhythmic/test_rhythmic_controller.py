@@ -121,6 +121,7 @@ def test_a_rhythm_never_settles_and_can_be_paused(learned):
     assert state.phase == before.phase
 
 
+@pytest.mark.soak
 def test_after_a_million_periods_the_phase_is_as_exact_as_in_the_first(make_rhythm, agree):
     """A million in `make soak`, else eighty thousand."""
     n_steps = 2500 if SOAK else 200

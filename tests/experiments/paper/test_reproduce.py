@@ -142,6 +142,7 @@ def test_the_draws_on_the_arm_are_those_that_the_page_was_written_from(computed,
     assert {name: arm["letter"][name] for name in numbers} == _close(numbers)
 
 
+@pytest.mark.soak
 def test_the_same_seed_gives_the_same_bytes_but_for_times(run, computed):
     """Figures depend on the seed alone, and tables on the numbers alone."""
     folder = run[1]
