@@ -37,6 +37,7 @@ def discovered(dataset, folder, *options):
     return told
 
 
+@pytest.mark.soak
 def test_it_shows_kinds_and_what_they_follow(dataset):
     shown = start("discover", dataset)
     assert shown.returncode == 0, shown.stderr

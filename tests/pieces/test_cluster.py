@@ -48,6 +48,7 @@ def test_workers_write_the_same_bytes(client, tmp_path):
     assert parts_of(tmp_path / "there") == parts_of(tmp_path / "here")
 
 
+@pytest.mark.soak
 def test_a_killed_worker_costs_no_piece(client, tmp_path):
     archive = write_archive(tmp_path / "archive", 120)
     killed = []

@@ -399,6 +399,7 @@ def test_a_first_place_in_millimeters_is_refused_with_what_can_be_done_here(tabl
     assert "--scale" not in str(refused.value)
 
 
+@pytest.mark.soak
 def test_recordings_may_have_an_origin_of_their_own(table):
     library, _, robot = table
     plan, _ = begin(table)
@@ -472,6 +473,7 @@ def test_symbols_that_swapped_their_names_are_drawn_and_watched_as_in_the_plan(p
         assert not any(watch(t, tip) for t, tip in zip(times, tips, strict=True))
 
 
+@pytest.mark.soak
 def test_joined_steps_do_not_stop_between_them(plane):
     domain, robot = learn_operators(plane), load("panda")
     far = next(name for name, where in domain.places.items() if where[1] > 0.45)

@@ -190,6 +190,7 @@ def test_a_monitor_that_is_reset_knows_nothing_of_what_was(fresh):
     assert distances(fresh, TIMES, movement) == expected
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("d", [1, 2, 7, slow(63)])
 def test_in_any_number_of_dimensions(d):
     monitor, movement = Monitor.of(draw(20, d=d)), draw(1, 16, d=d)[0].positions

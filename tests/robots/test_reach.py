@@ -92,6 +92,7 @@ def test_the_path_that_an_arm_recorded_is_followed_whatever_is_left_free(tmp_pat
     assert np.all((made.trajectory.positions >= robot.lower) & (made.trajectory.positions <= robot.upper))
 
 
+@pytest.mark.soak
 def test_joints_that_a_pose_leaves_free_keep_off_their_stops_and_do_not_slow_the_movement_down(tmp_path):
     robot = arm("pr2", tmp_path)
     made = move(recorded(robot, 13), robot, timing="slowed")

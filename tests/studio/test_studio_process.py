@@ -301,6 +301,7 @@ def test_on_a_network_and_for_reading_only_it_says_so_and_leaves_nothing_with_a_
     assert not list(tmp_path.glob("kineme-studio-*"))
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("busy", [slow("_prepare"), "close"])
 def test_it_ends_soon_whatever_still_runs(folder, busy):
     """Recognition is being compiled, by threads that Python joins, or closing waits: neither holds it up for long."""

@@ -117,6 +117,7 @@ def test_functions_are_mapped_and_differentiated_by_torch_func():
     assert not jacobian[:, 0, 1].any()
 
 
+@pytest.mark.soak
 def test_compiled_and_exported_modules_are_the_module():
     mp = module("original")
     weights, start, goal, velocity = tensors((4, 2, 6), (4, 2), (4, 2), (4, 2))

@@ -189,6 +189,7 @@ def test_robustness_grows():
     assert len({one for one, _ in conditions}) == len(conditions)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("d", [slow(1), 5])
 def test_other_dimensions_are_not_turned(make_small, d, monkeypatch):
     monkeypatch.setenv("KINEME_COMPILED", "never")  # to compile for these alone would take longer than all else
