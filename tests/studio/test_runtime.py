@@ -258,8 +258,8 @@ def test_samples_that_a_tracker_lost_are_left_out_as_in_python(length):
     ]
 
 
-CUTS = """const { uninterrupted } = await import(process.argv[1]);
-const cuts = JSON.parse(process.argv[2]).map((movement) => uninterrupted(movement, JSON.parse(process.argv[3])));
+CUTS = """const { withoutPauses } = await import(process.argv[1]);
+const cuts = JSON.parse(process.argv[2]).map((movement) => withoutPauses(movement, JSON.parse(process.argv[3])));
 console.log(JSON.stringify(cuts.map(({ times, positions }) => [[...times], [...positions]])));"""
 PAUSED = [
     [(16, 1.0), (1, 100.0, 2.0), (14, 1.0)],  # a gap of 2

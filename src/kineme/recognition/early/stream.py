@@ -179,8 +179,8 @@ class Live:
 
     def _estimate(self, samples: Array, status: LiveStatus) -> LiveState:
         elapsed = float(samples[-1, 0] - samples[0, 0])
-        recorded = np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
-        clean = recorded[0], without_glitches(recorded[1], np.array([0, len(samples)]))
+        recorded = np.ascontiguousarray(samples[:, 1:])
+        clean = np.ascontiguousarray(samples[:, 0]), without_glitches(recorded, np.array([0, len(samples)]))
         times, positions = _without_pauses(*clean, ALLOWANCE)
         how, unpaused = self._comparison.specification, _without_pauses(*clean)
         even = _smooth(times, positions, how.cutoff)

@@ -1,7 +1,8 @@
 // What movements are compared by: rows of numbers, segments and points; in single precision, as stored ones are.
 
 import { arcLengthPhase, evenPath } from "./preparation.js";
-import { uninterrupted } from "./pauses.js";
+import { withoutGlitches } from "./glitches.js";
+import { withoutPauses } from "./pauses.js";
 import { interpolate, linspace, product } from "./arrays.js";
 
 const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scaled up
@@ -219,8 +220,9 @@ function angle(vectors, p, q, d) {
 
 /** A movement as it is compared: its smooth path, rows with their squared norms, and shapes. */
 export function describeMovement(movement, how, arrays) {
-  const unpaused = uninterrupted(movement, how.pauses);
-  const smooth = (cutoff, rule) => evenPath(rule ? uninterrupted(movement, rule) : unpaused, cutoff, N_POINTS);
+  const clean = withoutGlitches(movement, how.pauses.glitches);
+  const unpaused = withoutPauses(clean, how.pauses);
+  const smooth = (cutoff, rule) => evenPath(rule ? withoutPauses(clean, rule) : unpaused, cutoff, N_POINTS);
   return describePath(smoothly(how, smooth), movement.positions, how, arrays);
 }
 

@@ -3,8 +3,9 @@
 import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js";
 import { N_POINTS, smoothly } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
+import { withoutGlitches } from "./glitches.js";
 import { beginnings } from "./hypotheses.js";
-import { uninterrupted } from "./pauses.js";
+import { withoutPauses } from "./pauses.js";
 import { evenPath, movement } from "./preparation.js";
 import { bestRotation } from "./rotation.js";
 
@@ -74,11 +75,12 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
     const soFar = movement(times, positions, d, columns);
-    const active = uninterrupted(soFar, early.pauses);
+    const clean = withoutGlitches(soFar, pauses.glitches);
+    const active = withoutPauses(clean, early.pauses);
     const duration = active.times.at(-1) - active.times[0];
     const begun = beginnings(smooth(active, cutoff), d, WHOLE, early);
-    const unpaused = uninterrupted(soFar, pauses);
-    const whole = smoothly(how, (cycles, rule) => smooth(rule ? uninterrupted(soFar, rule) : unpaused, cycles));
+    const unpaused = withoutPauses(clean, pauses);
+    const whole = smoothly(how, (cycles, rule) => smooth(rule ? withoutPauses(clean, rule) : unpaused, cycles));
     const elapsed = times[n - 1] - times[0];
     const evidence = logEvidence(stored, begun, whole, positions[0], duration);
     const share = shares(stored, evidence);

@@ -1,15 +1,8 @@
-// Movements as they are compared: without glitches, and with pauses cut short, stamps far apart and rests. The same as
-// kineme.movements.preparation.pauses, whose numbers come with the snapshot.
-
-import { withoutGlitches } from "./glitches.js";
-
-/** The movement without glitches and pauses; the same object if it has none. @param {PauseRule} rule */
-export function uninterrupted(movement, rule) {
-  return withoutPauses(withoutGlitches(movement, rule.glitches), rule);
-}
+// Pauses within a movement, cut short: stamps far apart, and rests. The same as kineme.movements.preparation.pauses,
+// whose numbers come with the snapshot.
 
 /** The movement without its pauses; the same object if it has none. @param {PauseRule} rule */
-function withoutPauses(movement, rule) {
+export function withoutPauses(movement, rule) {
   let cut = movement;
   for (let round = 0; round < rule.rounds; round++) {
     const { steps, remaining, changes } = shortened(cut, rule);
