@@ -20,9 +20,8 @@ from kineme.robots.planning.roles import (
     DRIVERS,
     Roles,
     Scales,
-    check_count,
+    check_columns,
     check_plausible,
-    check_tip,
     plane_of,
     roles_of,
     scales_of,
@@ -63,10 +62,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     """
     roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
     n = len(roles.positions)
-    if joints is None:
-        check_tip(roles)
-    else:
-        check_count(roles, joints)
+    check_columns(roles, joints)
     scaled = None if scale is None else Scales(np.full(n, scale), np.zeros(n), ("",) * n)
     scales = scaled or scales_of(roles, joints, joint_units)
     said: list[str] = []

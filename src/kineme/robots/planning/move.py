@@ -25,9 +25,8 @@ from kineme.robots.planning import robot_movement
 from kineme.robots.planning.roles import (
     JOINT_UNITS,
     SPACES,
-    check_count,
+    check_columns,
     check_plausible,
-    check_tip,
     plane_of,
     roles_of,
     scales_of,
@@ -263,11 +262,9 @@ def request_of(
     times, columns = recording.times, np.asarray(recording.recorded, dtype=float)
     space = space_of(recording.channels, columns, robot) if space == "auto" else space
     roles = roles_of(recording.channels, columns.shape[1], space, robot)
-    if space == "joints":
-        check_count(roles, robot)
-    else:
-        check_tip(roles)
-    scales = scales_of(roles, robot if space == "joints" else None, joint_units)
+    joints = robot if space == "joints" else None
+    check_columns(roles, joints)
+    scales = scales_of(roles, joints, joint_units)
     positions = columns[:, roles.positions] * scales.size + scales.offset
     if space == "joints":
         check_plausible(positions, robot)

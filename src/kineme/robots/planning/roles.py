@@ -27,6 +27,10 @@ _RATES = {"velocity", "velocities", "vel", "acceleration", "accelerations", "acc
 _AXES = "xyz"
 _SIDES = ("left", "right")  # what names of two arms begin with
 _SIDE = re.compile("(left|right|l|r)(?:arm|joint)?")  # a word of a name that says of which arm it is
+_DEGREES = (
+    "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
+    "--joint-units"
+)
 _Words = tuple[str, ...]
 
 SPACES = ("auto", "tip", "joints")
@@ -165,35 +169,29 @@ def _scale(name: str, text: str, native: str, robot: Robot | None, k: int) -> tu
     return float(unit.size), 0.0
 
 
-def check_tip(roles: Roles) -> None:
-    """Refuse positions of the tip that are neither two nor three; that poses are joints is not advised."""
-    if (n := len(roles.positions)) in (2, 3):
+def check_columns(roles: Roles, joints: Robot | None) -> None:
+    """Refuse another number of columns than the arm has joints, or, of its tip, than two or three.
+
+    That the columns of a pose are joints is not advised: they would be executed.
+    """
+    n = len(roles.positions)
+    if joints is not None and n != joints.n_joints:
+        raise TrajectoryError(
+            f"expected a movement of the {joints.n_joints} joints of {joints.name}, got {n} columns; "
+            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
+        )
+    if joints is not None or n in (2, 3):
         return
     names = [channel.name for channel in roles.columns]
     words = {word for name in names for word in words_of(name_of(name))}
     posed = {*_AXES} <= words or words & {"pose", "tcp", "tip"}
-    joints = "" if posed else ", or say that the columns are the joints (space='joints', --joints)"
+    as_joints = "" if posed else ", or say that the columns are the joints (space='joints', --joints)"
     among = f" among {first_names(names, 12)}" if names else ""
     raise TrajectoryError(
         f"expected a movement of the tip, of 2 or 3 dimensions, got {n}{among}; "
         "choose the position (columns=, in the shell --columns), and give the orientation, as a rotation vector or "
-        f"angles, as a quaternion in columns qw, qx, qy, qz{joints}"
+        f"angles, as a quaternion in columns qw, qx, qy, qz{as_joints}"
     )
-
-
-def check_count(roles: Roles, robot: Robot) -> None:
-    """Refuse another number of columns than the arm has joints."""
-    if len(roles.positions) != robot.n_joints:
-        raise TrajectoryError(
-            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
-            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
-        )
-
-
-_DEGREES = (
-    "if these are degrees, say joint_units='deg', if -100..100 of LeRobot, joint_units='percent', in the shell "
-    "--joint-units"
-)
 
 
 def check_plausible(positions: Array, robot: Robot, remedy: str = _DEGREES) -> None:
