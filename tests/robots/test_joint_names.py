@@ -103,6 +103,14 @@ def test_names_of_other_joints_are_refused_and_no_names_are_said(tmp_path):
         assert _moved(tmp_path, [f"q{k}" for k in range(6)], joints) == pytest.approx(joints[-1], abs=1e-6)
 
 
+def test_axes_are_no_joints_in_their_order():
+    robot = load("ur5e")
+    for head in ("{}.{}", "{}_angle_{} [rad]"):
+        names = [head.format(point, axis) for point in ("hand", "elbow") for axis in "xyz"]
+        with pytest.raises(TrajectoryError, match=r"or without axes, got hand.*; choose the place of the tip"):
+            roles_of(tuple(Channel(name, "angle", (name,)) for name in names), 6, "joints", robot)
+
+
 def test_the_joints_of_the_other_arm_are_refused(tmp_path):
     """Without a word the right arm executed what the left one was shown."""
     limit = '<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="50"/><origin xyz="0 0 0.2"/>'

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order
-from kineme.movements.channels.detect import find_channels, unit_of, units_filled
+from kineme.movements.channels.detect import find_channels, point_names, unit_of, units_filled
 
 T = 50
 U = np.linspace(0, 1, T)
@@ -78,6 +78,14 @@ def test_kinds_are_said_by_heads():
 @pytest.mark.parametrize("head", ["panda_joint1", "elbow [deg]", "wrist_yaw", "hip flexion (rad)", "theta"])
 def test_heads_of_joints_are_angles(head):
     assert found("x", head)[1].kind == "angle"
+
+
+@pytest.mark.parametrize("head", ["joints.hand.{}", "wrist_joint_{}", "JointType_HandRight.{}", "joint_positions.0.{}"])
+def test_the_place_of_the_joint_of_a_body_is_no_angle(head):
+    channels = found(*(head.format(axis) for axis in "xyz"), *(f"knee_{head.format(axis)}" for axis in "xyz"))
+    assert {one.kind for one in channels} == {"position"}
+    assert len(point_names(channels)) == 2
+    assert found("x", head.format("x [deg]"))[1].kind == "angle"
 
 
 @pytest.mark.parametrize("form", ["j{}", "J{}", "q_{}", "q[{}]", "actual_q_{}", "left j{}", "joints.{}"])

@@ -53,6 +53,7 @@ ANGLE_WORDS = frozenset(
         "euler", "rotation", "flexion", "abduction", "rad", "radian", "radians", "deg", "degree", "degrees",
     }
 )  # fmt: skip
+_OF_JOINTS = frozenset({"joint", "joints"})  # before an axis of a place: that of a body's joint, joints.hand.x
 #: A column that has one of them is no angle, whatever else its head says: ``joint1_torque``, ``yaw rate``.
 OTHER_QUANTITIES = frozenset(
     {
@@ -205,14 +206,16 @@ def _columns_named(heads: Sequence[str], key: str) -> list[int]:
 
 
 def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp], is_joint: bool) -> str:
-    words = set(words_of(head))
+    in_order = words_of(head)
+    words = set(in_order)
     if words & DISCRETE_WORDS and len(np.unique(values)) <= _LEVELS:
         return "discrete"
     measure = unit_named(unit or "")
     rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
     if rate or words & OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
         return "position"
-    named = words & ANGLE_WORDS and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
+    of_angles = words & ANGLE_WORDS - (_OF_JOINTS if {*in_order[-1:]} & {*"xyz"} else frozenset())
+    named = of_angles and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
     if is_joint or named or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"

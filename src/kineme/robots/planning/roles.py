@@ -295,10 +295,16 @@ def _axes_said(names: Sequence[str]) -> list[str]:
 
 
 def check_order(names: Sequence[str], robot: Robot) -> None:
-    """Warn that columns of other names are taken as the joints in their order; refuse rates, and names of another."""
+    """Warn that columns of other names are taken as the joints in their order; refuse rates, axes, names of another."""
     rates = list(filter(_is_rate, names))
     if rates:
         raise TrajectoryError(f"expected positions of the joints, got {', '.join(rates)}; choose other columns")
+    if {"x", "y"} <= {*_axes_said(names)}:
+        raise TrajectoryError(
+            f"expected columns with the names of the joints of {robot.name}, {', '.join(robot.joints)}, or without "
+            f"axes, got {', '.join(names)}; choose the place of the tip (columns=, in the shell --columns), or rename "
+            "them if they are joints"
+        )
     _check_no_others([split_head(name)[0].removesuffix(DRIVERS) for name in names], robot)
     words, joints = [words_of(name_of(name)) for name in names], _different(list(map(words_of, robot.joints)))
     listed = ", ".join(names)
