@@ -200,6 +200,13 @@ def test_what_is_no_unit_of_an_angle(head, unit):
         "joint_1.effort",
         "joint1.velocity",
         "x_deg_s",
+        "joint1_current",
+        "joint_load [%]",
+        "joint_temp",
+        "joint1_status",
+        "joint_reaction_x",
+        "oil_deg_C",
+        "yaw current (A)",
     ],
 )
 def test_jumps_of_what_is_no_angle_are_kept(head):
@@ -207,10 +214,24 @@ def test_jumps_of_what_is_no_angle_are_kept(head):
 
 
 @pytest.mark.parametrize(
-    "head", ["joint[0]", "joint_1_s", "yaw (filtered)", "current_yaw", "shoulder [°]", "hip [rad]"]
+    "head", ["joint[0]", "joint_1_s", "yaw (filtered)", "current_yaw", "joint1_current_position", "hip [rad]", "a [°]"]
 )
 def test_angles_whatever_else_their_heads_say(head):
     assert found("x", head)[1].kind == "angle"
+
+
+def test_the_word_joint_beside_an_unknown_one_takes_away_no_jump_that_is_no_wrap():
+    """Without a unit, nothing else says that joint1_pressure is an angle, where its values do not."""
+    switched = np.where(U > 0.5, 3.0, -3.0) + 0.1 * np.sin(9 * U)
+    wrapped = np.mod(3 + 2 * U + np.pi, 2 * np.pi) - np.pi
+    for head, column, kind in (
+        ("joint1_pressure", switched, "position"),
+        ("joint1_pressure", U, "angle"),
+        ("joint1_pressure", wrapped, "angle"),
+        ("panda_joint1", switched, "angle"),
+        ("joint1_position", switched, "angle"),
+    ):
+        assert found("x", head, columns=np.column_stack([U, column]))[1].kind == kind
 
 
 def quaternion(n_odd=0):
@@ -310,7 +331,13 @@ def numbered(scalar, sign=1.0):
 
 
 @pytest.mark.parametrize(
-    "heads", [["q0", "q1", "q2", "q3"], ["q1", "q2", "q3", "q4"], [f"quat[{k}]" for k in range(4)]]
+    "heads",
+    [
+        ["q0", "q1", "q2", "q3"],
+        ["q1", "q2", "q3", "q4"],
+        [f"quat[{k}]" for k in range(4)],
+        [f"joint_orientations.0.{k}" for k in range(4)],
+    ],
 )
 @pytest.mark.parametrize(("scalar", "order"), [(0, "wxyz"), (3, "xyzw")])
 def test_the_scalar_of_a_numbered_quaternion_is_where_no_sign_changes(heads, scalar, order):

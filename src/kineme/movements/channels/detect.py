@@ -30,7 +30,7 @@ from kineme.validation import Array
 
 _MOST = 0.9  # of the samples: columns w, x, y, z without another name are a quaternion if so many are of norm 1
 _NORM = 0.01  # deviation of a norm from 1, at most
-_NAMES = frozenset({"q", "quat", "quaternion", "quaternions", "orientation", "ori", "rotation", "rot"})
+_NAMES = frozenset({"q", "quat", "quaternion", "quaternions", "orientation", "orientations", "ori", "rotation", "rot"})
 _UNIT_BESIDE_PART = re.compile(
     r"[\[(](?![wxyz\d][\])])[^\[\]()]*[\])]\s*$", re.IGNORECASE
 )  # that of quat[x] is a component
@@ -59,13 +59,17 @@ OTHER_QUANTITIES = frozenset(
     {
         "velocity", "velocities", "vel", "speed", "rate", "acceleration", "accelerations", "acc", "accel", "jerk",
         "torque", "torques", "tau", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro",
-        "omega",
+        "omega", "currents", "load", "loads", "moment", "moments", "reaction", "stiffness", "damping", "pwm", "duty",
+        "temp", "temperatures", "celsius", "fahrenheit", "status", "mode", "confidence", "likelihood",
     }
 )  # fmt: skip
 #: Ends of the names of a place and, after it, of a rotation vector; the last are those of ``actual_TCP_pose_0``.
 _POSES = (("x", "y", "z", "rx", "ry", "rz"), ("tx", "ty", "tz", "rx", "ry", "rz"), tuple("012345"))
 #: What the names of rotation vectors say, and their ends.
 _TURNS, _ENDS = ("axisangle", "rotvec", "rotationvector"), ("xyz", "012", "123")
+_OF_HEAT = re.compile(r"(?<![A-Za-z])(?i:deg(?:rees?|s)?)[\W_]*[CF](?![A-Za-z])")  # oil_deg_C
+#: What joints are said to have where a position is meant.
+_OF_POSITIONS = frozenset({"pos", "position", "positions", "state", "states", "value", "values", *_OF_JOINTS})
 _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
 #: Drivers of motors call a position so, ``wrist_roll.pos``, in degrees, radians or percent of the range alike.
 _OF_MOTOR, _PERCENT, _TURN = "pos", 100.0, 2.0 * np.pi
@@ -151,7 +155,11 @@ def unit_of(head: str) -> str | None:
     words = words_of(head)
     if _IN_METERS.fullmatch(head):
         return "m"
-    return None if _PER_TIME & {*words} else next((_UNIT_WORDS[word] for word in words if word in _UNIT_WORDS), None)
+    return (
+        None
+        if _PER_TIME & {*words} or _OF_HEAT.search(head)
+        else next((_UNIT_WORDS[word] for word in words if word in _UNIT_WORDS), None)
+    )
 
 
 def name_of(head: str) -> str:
@@ -212,13 +220,23 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
         return "discrete"
     measure = unit_named(unit or "")
     rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
-    if rate or words & OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
+    if rate or _says_other(head) or (measure is not None and measure.quantity != "angle"):
         return "position"
     of_angles = words & ANGLE_WORDS - (_OF_JOINTS if {*in_order[-1:]} & {*"xyz"} else frozenset())
     named = of_angles and not (_OF_MOTOR in words and unit is None and _may_be_percent(values))
-    if is_joint or named or measure is not None or wrap_period(values, offsets) is not None:
+    if is_joint or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
-    return "position"
+    # What follows "joint", as in joint1_pressure, may be any quantity: such jumps are then taken for no wraps.
+    other = of_angles <= _OF_JOINTS and not {*[word for word in in_order if not word.isdecimal()][-1:]} & _OF_POSITIONS
+    jumps = other and without_wraps(values, offsets, period_of(values, None)) is not values
+    return "angle" if named and not jumps else "position"
+
+
+def _says_other(head: str) -> bool:
+    """Tell whether a head names a quantity that is no angle; ``joint1_current`` does, ``current_yaw`` does not."""
+    words = words_of(head)
+    last = [word for word in words_of(name_of(head)) if not word.isdecimal()][-1:]
+    return bool({*words} & OTHER_QUANTITIES) or last == ["current"] or _OF_HEAT.search(head) is not None
 
 
 def rotation_vectors(heads: Sequence[str]) -> list[tuple[int, ...]]:
@@ -365,7 +383,7 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 
 
 #: Columns with one of them are no places, though they have three axes.
-_NO_PLACES = OTHER_QUANTITIES | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
+_NO_PLACES = OTHER_QUANTITIES - {"load", "loads"} | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
 _SIDES = ({"l", "r"}, {"left", "right"})  # lx beside rx; without it rx is a rotation
 
 
