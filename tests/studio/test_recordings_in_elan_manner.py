@@ -163,6 +163,15 @@ def test_a_unit_that_the_file_does_not_say_is_given_and_one_that_it_says_stays(t
     (measured,) = read_recordings(tmp_path / "a.csv", measured_in="mm").demonstrations
     assert [channel.unit for channel in measured.channels] == ["mm", "mm", None]
     np.testing.assert_allclose(measured.positions, plain.positions * [1, 10, 1])
+    (tmp_path / "b.json").write_text(
+        json.dumps(
+            [{"t": t, "joints": [{"name": "a", "x": x, "y": t}]} for t, (x, _) in zip(T, X.tolist(), strict=True)]
+        )
+    )
+    joints = read_recordings(tmp_path / "b.json", measured_in="mm")
+    assert ([channel.unit for channel in joints.demonstrations.channels], joints.notes) == (["mm", "mm"], ())
+    (note,) = read_recordings(tmp_path / "a.csv", measured_in="mm", columns=["yaw"]).notes
+    assert note == "no column is in mm, as measured_in= (--measured-in) says: none without a unit can be in it"
     with pytest.raises(SpecificationError, match="expected measured_in to be a unit"):
         read_recordings(tmp_path / "a.csv", measured_in="parsec")
 

@@ -20,6 +20,7 @@ from kineme.io.reading.column_order import dimensions_unlike, in_one_set
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, note_on_missing
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
+from kineme.movements.channels.column_match import columns_detected
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels, kinds_of
 from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
@@ -29,7 +30,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, Movemen
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, of_channels
 from kineme.reporting.text import counted, first_names
-from kineme.units import UNITS
+from kineme.units import UNITS, unit_named
 from kineme.validation import Array
 
 GAP = 3.0  # steps longer than this many median steps are gaps: at least two samples are missing
@@ -154,12 +155,21 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
     notes = (
         [f"read the columns of these numbers, {listed(taken[0])}: counted from 0, over all of a file"] if taken else []
     )
+    notes += _notes_on_unit(layout.measured_in, [how for how, _ in detected])
     if counting := [*dict.fromkeys(head for how, _ in detected for head in how.in_blocks)]:
         notes.append(
             f"{first_names(counting, _NAMED)} may count movements that are read as one: the value changes after many "
             "samples, and never back; if so, say movement=, in the shell --movement"
         )
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
+
+
+def _notes_on_unit(unit: str | None, detected: Sequence[Detected]) -> list[str]:
+    """Say that no column is in the unit that is said to be that of all of which the files say none."""
+    units = [unit_named(each or "") for how in detected for each in columns_detected(how).units]
+    if unit is None or unit_named(unit) in units or any(how.converted for how in detected):
+        return []
+    return [f"no column is in {unit}, as measured_in= (--measured-in) says: none without a unit can be in it"]
 
 
 def _without_unclear_times(files: Sequence[FileRead]) -> list[FileRead]:
