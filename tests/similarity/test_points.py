@@ -132,8 +132,8 @@ def test_names_of_columns_tell_the_points():
     joints = ("Wrist.X", "Wrist.Y", "Elbow.X", "Elbow.Y", "Tip.X", "Tip.Y")
     assert point_names(channels(*joints)) == ("wrist", "elbow", "tip")
     assert point_names(channels("x", "y", "z")) == point_names(None) == ()
-    sensors = [f"{kind}_{axis}" for kind in ("acc", "gyro") for axis in "xyz"]
-    assert point_names(channels(*sensors)) == ()
+    for pair in ("acc gyro", "Accelerometer Gravity", "LeftAccelerometer RightAccelerometer", "imu1 imu2"):
+        assert point_names(channels(*[f"{kind}.{axis}" for kind in pair.split() for axis in "xyz"])) == ()
     assert point_names(channels(*HANDS[:4], HANDS[5], HANDS[4])) == ()
     assert point_names(channels(*[f"joint{k}" for k in range(6)])) == ()
     for heads, names in (

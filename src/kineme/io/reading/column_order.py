@@ -11,6 +11,7 @@ from kineme.errors import TrajectoryError
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.column_match import Columns, columns_detected, columns_like
+from kineme.movements.channels.detect import SENSORS
 from kineme.movements.tables.columns import beside_positions
 from kineme.movements.tables.layout import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
@@ -18,12 +19,7 @@ from kineme.reporting.text import first_names
 from kineme.units import unit_named
 
 #: Words in names of files that say which sensor of a device wrote x, y and z.
-_SENSORS = frozenset(
-    {
-        "accelerometer", "acceleration", "gyroscope", "gyro", "magnetometer", "gravity", "barometer", "battery",
-        "uncalibrated", "linear", "total",
-    }
-)  # fmt: skip
+_SENSORS = SENSORS | {"acceleration", "battery", "uncalibrated", "linear", "total"}
 
 _NAMED = 6  # columns that a note names
 

@@ -382,8 +382,10 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
     )
 
 
+#: Sensors of motion, as heads of columns and names of files say them.
+SENSORS = frozenset({"accelerometer", "gyroscope", "gyro", "magnetometer", "gravity", "barometer"})
 #: Columns with one of them are no places, though they have three axes.
-_NO_PLACES = OTHER_QUANTITIES - {"load", "loads"} | {"gyroscope", "mag", "magnetometer", "emg", "euler"}
+_NO_PLACES = OTHER_QUANTITIES - {"load", "loads"} | SENSORS | {"imu", "mag", "magnetic", "emg", "euler"}
 _SIDES = ({"l", "r"}, {"left", "right"})  # lx beside rx; without it rx is a rotation
 
 
