@@ -41,7 +41,7 @@ _TABLE = (
     (Unit("rev", "angle", tau), "rev(s) revolution(s) turn(s)"),
     (Unit("s", "time", Fraction(1)), "s sec(s) second(s)"),
     (Unit("ms", "time", Fraction("1e-3")), "ms msec(s) millis millisecond(s)"),
-    (Unit("us", "time", Fraction("1e-6")), "us µs μs usec(s) micros microsecond(s)"),
+    (Unit("us", "time", Fraction("1e-6")), "us µs μs usec(s) µsec(s) μsec(s) micros microsecond(s)"),
     (Unit("100ns", "time", Fraction("1e-7")), "100ns"),  # of Windows and .NET
     (Unit("ns", "time", Fraction("1e-9")), "ns nsec(s) nanos nanosec(s) nanosecond(s)"),
     (Unit("min", "time", Fraction(60)), "min minute(s)"),

@@ -283,7 +283,7 @@ def test_times_that_may_be_of_another_unit_and_derivatives_are_said(tmp_path):
     rows = "".join(f"{2 * k},{k},{k * k},{2 * k}\n" for k in range(20))
     (tmp_path / "a.csv").write_text("time,x,y,vy\n" + rows)
     learned = answer("learn", tmp_path / "a.csv", "--label", "unknown", "-l", tmp_path / "actions")
-    named, aside, rate = learned["notes"]
+    rate, named, aside = learned["notes"]
     assert named.startswith("a symbol named 'unknown' counts as none")
     assert aside.startswith("left aside vy, ")
     assert rate == "0.5 samples per second are unusual; if the unit of time is another, give --units"

@@ -9,7 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.movements.tables.time_stamps import is_date, nanoseconds, same_clock, seconds_of_dates, unit_by_size
+from kineme.io.reading.recordings import read_recording, read_recordings
+from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.time_stamps import (
+    is_date,
+    nanoseconds,
+    same_clock,
+    seconds_of_dates,
+    unit_by_size,
+    unit_in_head,
+)
 
 STAMPS = [1_700_000_000 + k // 2 for k in range(20)], [500_000_000 * (k % 2) for k in range(20)]
 
@@ -147,6 +156,29 @@ def test_steps_of_stamps_that_count_from_anywhere_say_their_unit(step, unit):
     assert unit_by_size(step * np.arange(20.0))[0] == unit
     stamps = PER_SECOND["s"] * (1_700_000_000.0 + 1e-3 * step * np.arange(20))
     assert unit_by_size(stamps, "unix time") == ("s", "since 1970")  # up to seventeen minutes apart
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["ms_elapsed", "milliseconds_elapsed", "Time(ms) relative", "time_ms_since_boot", "ms since start time", "mSecs",
+     "time_mSec", "elapsed_mS", "timeMSec"],
+)  # fmt: skip
+def test_the_unit_of_time_is_a_word_anywhere_in_the_head(tmp_path, head):
+    (tmp_path / "a.csv").write_text(f"{head},x\n" + "".join(f"{k},{k % 7}\n" for k in range(2000)))
+    recordings = read_recordings(tmp_path / "a.csv")
+    assert (recordings.demonstrations.durations[0], recordings.detected[0][0].units_from) == (1.999, "head")
+    assert unit_in_head(f"{head} 100 ns") == "100ns"
+    assert unit_in_head("timestamp_S1") is None
+    assert not is_time("uS")  # of conductance
+
+
+def test_an_unusual_rate_is_noted_of_what_is_read(tmp_path):
+    (tmp_path / "a.csv").write_text("time,x\n" + "".join(f"{k},{k % 7}\n" for k in range(50)))
+    (note,) = read_recordings(tmp_path / "a.csv").notes
+    assert note == "1 samples per second are unusual; if the unit of time is another, give --units"
+    with pytest.warns(UserWarning, match="1 samples per second are unusual"):
+        read_recording(tmp_path / "a.csv")
+    assert read_recordings(tmp_path / "a.csv", units="ms").notes == ()
 
 
 def test_clocks_of_one_device_drift_a_little():

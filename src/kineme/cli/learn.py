@@ -101,10 +101,7 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
             "notes": [
-                *parsed.notes,
-                *heard,
-                *notes_on_heads(parsed),
-                *notes_on_samples(parsed),
+                *dict.fromkeys((*parsed.notes, *heard, *notes_on_heads(parsed), *notes_on_samples(parsed))),
                 *_notes_on_order(library, parsed),
             ],
         }

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
 from kineme.io.reading.formats import entries_of, format_at
-from kineme.io.reading.merge_files import Recordings, notes_on_gaps, notes_on_sampling, sampling_of
+from kineme.io.reading.merge_files import Recordings, notes_on_gaps, notes_on_values, sampling_of
 from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
-from kineme.movements.channels.coordinates import columns_of, lever_of, period_by_unit
-from kineme.movements.channels.detect import point_names, rotation_vectors
+from kineme.movements.channels.coordinates import columns_of, lever_of
+from kineme.movements.channels.detect import point_names
 from kineme.movements.tables.layout import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -163,7 +163,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
     unlabeled = sum(summary.movements for summary in labels if summary.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    return notes + notes_on_samples(recordings) + _notes_on_channels(demos)
+    return [*dict.fromkeys(notes + notes_on_samples(recordings) + _notes_on_channels(demos))]
 
 
 def notes_on_heads(recordings: Recordings) -> list[str]:
@@ -175,8 +175,8 @@ def notes_on_heads(recordings: Recordings) -> list[str]:
 def notes_on_samples(recordings: Recordings) -> list[str]:
     """Say what a person should know of the samples before they rely on what is learned of them."""
     demos = recordings.demonstrations
-    notes = notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos)
-    return notes + _notes_on_points(demos) + _notes_on_rotation_vectors(demos) + _notes_on_extents(demos)
+    notes = notes_on_gaps(recordings) + notes_on_values(recordings) + notes_on_sizes(demos)
+    return notes + _notes_on_points(demos) + _notes_on_extents(demos)
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
@@ -235,23 +235,6 @@ def _notes_on_points(demos: Demonstrations) -> list[str]:
     """Say which points the columns are, by their names, and how they are compared."""
     names = point_names(demos.channels)
     return [f"{len(names)} points that turn together: {first_names(names, _CHANNELS)}"] if names else []
-
-
-def _notes_on_rotation_vectors(demos: Demonstrations) -> list[str]:
-    """Say which columns are a rotation vector, by their names, and by norms that come to half a turn."""
-    channels, notes = demos.channels or (), list[str]()
-    for three in rotation_vectors([channel.name for channel in channels]):
-        if any(channels[k].kind != "position" for k in three):
-            continue
-        r = demos.recorded[:, [columns_of(channels)[k].start for k in three]]
-        turn = period_by_unit(channels[three[0]].unit or "rad") or 0.0
-        if turn / 4 < np.linalg.norm(r, axis=1).max() <= turn:  # forces are larger, small rotations do not jump
-            notes.append(
-                f"{', '.join(channels[k].name for k in three)} look like a rotation vector: near half a turn, as of "
-                "a tool that points down, it jumps, and is learned so; write columns qx, qy, qz, qw instead, in Python "
-                f"scipy.spatial.transform.Rotation.from_rotvec(r{', degrees=True' * (turn == 360)}).as_quat()"
-            )
-    return notes
 
 
 def _notes_on_extents(demos: Demonstrations) -> list[str]:

@@ -7,14 +7,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
+import numpy as np
+
 from kineme.errors import TrajectoryError
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, in_shell
 from kineme.movements.channels.column_match import Columns, columns_detected, columns_like
-from kineme.movements.channels.detect import SENSORS
+from kineme.movements.channels.coordinates import columns_of, period_by_unit
+from kineme.movements.channels.detect import SENSORS, rotation_vectors
 from kineme.movements.tables.columns import beside_positions
 from kineme.movements.tables.layout import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.reporting.text import first_names
 from kineme.units import unit_named
 
@@ -101,6 +105,23 @@ def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
         f"left aside {first_names(named, _NAMED)}, which are no positions but of positions that are read; say "
         "--columns with all that count to read them too"
     ]
+
+
+def notes_on_rotation_vectors(demos: Demonstrations) -> list[str]:
+    """Say which columns are a rotation vector, by their names, and by norms that come to half a turn."""
+    channels, notes = demos.channels or (), list[str]()
+    for three in rotation_vectors([channel.name for channel in channels]):
+        if any(channels[k].kind != "position" for k in three):
+            continue
+        r = demos.recorded[:, [columns_of(channels)[k].start for k in three]]
+        turn = period_by_unit(channels[three[0]].unit or "rad") or 0.0
+        if turn / 4 < np.linalg.norm(r, axis=1).max() <= turn:  # forces are larger, small rotations do not jump
+            notes.append(
+                f"{', '.join(channels[k].name for k in three)} look like a rotation vector: near half a turn, as of "
+                "a tool that points down, it jumps, and is learned so; write columns qx, qy, qz, qw instead, in Python "
+                f"scipy.spatial.transform.Rotation.from_rotvec(r{', degrees=True' * (turn == 360)}).as_quat()"
+            )
+    return notes
 
 
 def _differences(own: Columns, ours: Columns) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.arrays.npz import Npz
 from kineme.io.reading.check_block import check_block, movement_of, take_movements
-from kineme.io.reading.column_order import dimensions_unlike, in_one_set
+from kineme.io.reading.column_order import dimensions_unlike, in_one_set, notes_on_rotation_vectors
 from kineme.io.reading.read_file import FileRead
 from kineme.io.records import Problem, note_on_missing
 from kineme.movements.channels.channel import Channels, is_plain, recorded_names
@@ -344,7 +344,12 @@ def notes_on_gaps(recordings: Recordings) -> list[str]:
     return notes + note_on_missing(recordings.problems)
 
 
-def notes_on_sampling(recordings: Recordings) -> list[str]:
+def notes_on_values(recordings: Recordings) -> list[str]:
+    """Say what stamps and columns of movements let doubt: their unit, gaps, rotation vectors that jump."""
+    return _notes_on_sampling(recordings) + notes_on_rotation_vectors(recordings.demonstrations)
+
+
+def _notes_on_sampling(recordings: Recordings) -> list[str]:
     """Say that the rate is unusual, and that there are no samples for so long that a movement may be several."""
     sampling, notes = sampling_of(recordings.demonstrations), []
     rate = float(np.median(sampling.rates))

@@ -18,7 +18,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.limits import check_expanded, read_limited
-from kineme.io.reading.merge_files import Recordings, Source, demonstrations_of
+from kineme.io.reading.merge_files import Recordings, Source, demonstrations_of, notes_on_values
 from kineme.io.records import NO_SYMBOLS, UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
 from kineme.reporting.text import counted, text_in
@@ -331,7 +331,9 @@ def cut_stretches(recordings: Recordings, stretches: Sequence[Stretch]) -> Recor
     cut = demonstrations_of(
         positions, movements.stamps[rows], offsets, sources, movements.channels, movements.dimensions
     )
-    return replace(recordings, demonstrations=cut, sources=tuple(sources))
+    of_whole = {*notes_on_values(recordings)}
+    notes = tuple(note for note in recordings.notes if note not in of_whole)
+    return replace(recordings, demonstrations=cut, sources=tuple(sources), notes=notes)
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:

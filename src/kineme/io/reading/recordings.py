@@ -14,7 +14,7 @@ from kineme.errors import DataError, SpecificationError, warn
 from kineme.io.limits import max_file_bytes
 from kineme.io.reading.formats import Entry, as_text, data_set_of, entries_of, in_words, name_of, root_of
 from kineme.io.reading.join_files import Placed, join_files, notes_on_clocks
-from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps
+from kineme.io.reading.merge_files import Recordings, merge_files, notes_on_gaps, notes_on_values
 from kineme.io.reading.read_file import FileRead, format_of, read_bytes, read_file
 from kineme.io.records import Problem
 from kineme.movements.preparation.trim import TrimRest
@@ -187,7 +187,7 @@ def read_paths(
     recordings = read_entries(entries, how, progress, standard_input, paths, problems)
     given = [] if standard_input is None else [Path(standard_input[0])]
     check_asked(layout, heads_of(recordings), recordings.people is not None, in_words([*paths, *given]))
-    return recordings
+    return replace(recordings, notes=(*recordings.notes, *notes_on_values(recordings)))
 
 
 def read_entries(
@@ -281,7 +281,7 @@ def read_recording(path: str | Path) -> Trajectory:
         raise problem.error(str(problem._replace(file=str(path))))
     if len(recordings) > 1:
         raise DataError(f"expected one movement in {path}, got {len(recordings)}; read them with read_recordings")
-    for note in notes_on_gaps(recordings):
+    for note in notes_on_gaps(recordings) + notes_on_values(recordings):
         warn(f"{path}: {note}", UserWarning, 2)
     named = replace(recordings.demonstrations.movements, names=(str(name_of(path)),), labels=None)
     return Demonstrations.of_movements(named)[0]

@@ -21,7 +21,11 @@ PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 #: Names of units of time within words, as in ``elapsed_ms``; these are too often something else there: t_min, h.
 TIME_UNITS = frozenset(name for name, unit in UNITS.items() if unit.quantity == "time") - {"min", "h"}
 
-_WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+")  # camelCase, snake_case, [units] apart
+#: Words of camelCase, snake_case and [units] apart, but mSec and elapsed_mS are units; uS alone may be of conductance.
+_WORDS = re.compile(
+    r"(?:(?<![^\W\d_])[mnuµμ]|[MNU])Secs?(?![a-z])|(?<=[\W_])[mnuµμ]S(?![A-Za-z])|"
+    r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+"
+)
 
 _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds since 1970
 
@@ -63,13 +67,15 @@ def words_of(head: str) -> tuple[str, ...]:
 
 
 def unit_in_head(head: str) -> str | None:
-    """The unit of time that a column's head ends in, in brackets or as a word, if it names one."""
+    """The unit of time that a column's head names, in brackets or as its last word that is one; s only at its end."""
     (_, bracketed), words = split_head(head), words_of(head)
     if (unit := unit_named(bracketed or "")) is not None and unit.quantity == "time":
         return unit.symbol
-    if words[-2:] == ("100", "ns"):
-        return "100ns"
-    return UNITS[words[-1]].symbol if words and words[-1] in TIME_UNITS else None
+    last = len(words) - 1
+    k = next((k for k in range(last, -1, -1) if words[k] in TIME_UNITS and (k == last or words[k] != "s")), None)
+    if k is None:
+        return None
+    return "100ns" if words[max(k - 1, 0) : k + 1] == ("100", "ns") else UNITS[words[k]].symbol
 
 
 def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
