@@ -38,6 +38,17 @@ def test_a_recording_replays_to_the_screen(recording, tmp_path):
         np.testing.assert_allclose(table[axis], expected, atol=0.1)  # mm, of a shape 45 mm wide
 
 
+def test_a_rotation_vector_that_jumps_is_said_before_it_is_generated(tmp_path):
+    """Of a tool that points down; the fit is off by up to half a turn."""
+    columns = np.linspace(0, 1, 60)[:, None] * [1.0, 0.1, 0.2, 0.3, 0.1, 0.1, 0.1] + [0, 0, 0, 0, 2.1, 2.1, 0]
+    columns[30:, 4:] *= 1 - 2 * np.pi / np.linalg.norm(columns[30:, 4:], axis=1, keepdims=True)
+    path = tmp_path / "tool.csv"
+    np.savetxt(path, columns, delimiter=",", header="time,x,y,z,rx,ry,rz", comments="")
+    (note,) = kineme.read_recordings(path).notes
+    assert note.startswith("rx, ry, rz look like a rotation vector")
+    assert f"note: {note}" in run(path, "-o", tmp_path / "new.csv").stderr
+
+
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".json"])
 def test_start_goal_and_duration_are_met_in_every_format(recording, tmp_path, ending):
     out = tmp_path / f"new{ending}"

@@ -13,7 +13,7 @@ import click
 from click.core import ParameterSource
 
 from kineme.cli.options import READING, SPECIFICATION, Finite, Parsed, given_options, opened, under
-from kineme.cli.output import progress
+from kineme.cli.output import progress, write
 from kineme.reporting.text import first_names, printable
 
 _some = partial(first_names, most=6)  # columns that a sentence names
@@ -262,6 +262,8 @@ def read_source(options: dict[str, Any]) -> Any:
         return Learned(_chosen(load_saved(Path(source)), options))
     dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
+    for note in recordings.notes:
+        write(f"note: {printable(note)}", err=True)
     return learn_one(_chosen(recordings, options), dmp)
 
 
