@@ -36,6 +36,8 @@ def _written(path, heads, values=None):
         (["x", "y"], ["confidence", "residual"]),
         (["pos_x", "y_position"], ["pos_x_vel", "a_y_position", "pos_confidence"]),
         (["q[0]", "actual_q_0"], ["dq[0]", "actual_qd_0", "qdot[0]"]),
+        (["HandRight_X", "HandRight_Y"], ["HandRight_State", "HandRight_TrackingState"]),
+        (["norm_pos_x", "norm_pos_y", "observation.state.x"], ["confidence", "Status (hex)"]),
     ],
 )
 def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_path, positions, others):
@@ -51,12 +53,25 @@ def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_p
 
 
 @pytest.mark.parametrize(
-    "heads", [("vx", "vy"), ("acc_x", "acc_y", "gyro_x"), ("score", "x2"), ("ear_score", "nose_x")]
-)
+    "heads",
+    [
+        ("vx", "vy"), ("acc_x", "acc_y", "gyro_x"), ("score", "x2"), ("ear_score", "nose_x"), ("x", "state"),
+        ("observation.state.0", "observation.state.x"), ("hand_x", "gripper_status"), ("thumb", "right_index"),
+    ],
+)  # fmt: skip
 def test_the_same_words_without_such_positions_are_coordinates(tmp_path, heads):
     read = kineme.read_recordings(_written(tmp_path / "a.csv", heads))
     assert read.detected[0][0].columns == heads
     assert notes_on_aside(how for how, _ in read.detected) == []
+
+
+def test_counters_and_clocks_of_devices_are_left_aside_if_they_count(tmp_path):
+    counters = {"world_index": np.arange(T) // 2 + 40, "RDTSequence": 4000 + np.arange(T), "SampleTimeFine": 333.0 * U}
+    path = _written(tmp_path / "a.csv", ["x", "goal_index"], counters)
+    for demos in (kineme.read_recordings(path).demonstrations, kineme.Demonstrations.of(pd.read_csv(path))):
+        assert demos.dimensions == ("x", "goal_index")
+    notes = inspect(kineme.read_recordings(_written(tmp_path / "b.csv", ["x"], {"ticks": 10 * np.arange(T)}))).notes
+    assert "ticks counts in steps of 10; if it is no coordinate, --exclude leaves it out" in notes
 
 
 @pytest.mark.parametrize(

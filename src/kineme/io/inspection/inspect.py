@@ -32,6 +32,7 @@ _IDLE = ("nothing", "is fixed")  # how the last cell of a row begins that holds 
 
 _SHOWN = 20  # lines of a list; the rest is counted
 _COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
+_COUNTED = 30  # steps, all of one size, that no hand and no robot makes
 
 _MORE = 10.0  # times the extent of all others
 _LARGER = 30.0  # times the extent of the smallest movement of a label: a degree and a radian are 57 apart
@@ -192,6 +193,10 @@ def _notes_on_channels(demos: Demonstrations) -> list[str]:
         values = x[:, columns.start]
         if channel.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
             notes.append(f"{channel.name} is 0 or 1 throughout; if it is a switch, say --kind {channel.name}=discrete")
+        steps = np.delete(np.diff(values), demos.offsets[1:-1] - 1)
+        step = steps[0] if (steps == steps[0]).all() and (values == np.rint(values)).all() else 0
+        if channel.kind == "position" and step and len(steps) >= _COUNTED and len(named) > 1:
+            notes.append(f"{channel.name} counts in steps of {step:g}; if it is no coordinate, --exclude leaves it out")
     return notes
 
 

@@ -29,7 +29,7 @@ from kineme.io.tables.dialect import (
     numbers_in,
     split,
 )
-from kineme.movements.tables.columns import Roles, choose_roles, counts_samples
+from kineme.movements.tables.columns import Roles, choose_roles, may_count
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import FLAGS, Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
@@ -122,7 +122,7 @@ def _roles_and_rows(
     """Find the roles of columns and read their rows; whether those count that are named so is seen in their cells."""
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named, lambda _: _NO_COUNT)
     are_found = dialect.named and layout.coordinates is None
-    counters = {k for k in roles.positions if are_found and counts_samples(dialect.heads[k])}
+    counters = {k for k in roles.positions if are_found and may_count(dialect.heads[k])}
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
     texts |= {k for k, kind in enumerate(dialect.kinds) if kind == "flag"}

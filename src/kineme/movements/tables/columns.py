@@ -52,6 +52,8 @@ _DERIVATIVE_WORDS = frozenset(
 )  # fmt: skip
 #: Words of columns that say how sure the position of the same name is.
 _CONFIDENCE_WORDS = frozenset({"confidence", "conf", "likelihood", "score", "visibility", "presence", "residual"})
+_STATES = frozenset({"state", "status"})  # the same where names end in them: HandRight_TrackingState
+_ALONE = ({"confidence"}, {"likelihood"}, {"status"})  # that are of all points where no name stands beside them
 _AXES = frozenset("xyz")
 _BESIDE_AZ = ("el", "elevation", "x", "y", "ax", "ay")  # what tells an azimuth from an acceleration along z
 
@@ -344,11 +346,16 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 def beside_positions(heads: Sequence[str]) -> set[str]:
     """The heads of derivatives, efforts and confidences of positions that are there too.
 
-    So ``x_vel``, ``vx``, ``dx`` and ``x_dot`` beside ``x`` or ``pos_x``, and ``nose_score`` beside ``nose_x``.
+    So ``x_vel``, ``vx``, ``dx`` and ``x_dot`` beside ``x`` or ``pos_x``, and ``nose_score`` beside ``nose_x``. A state
+    is of a point that has its name, a ``confidence`` or ``status`` without a name of all that is there.
     """
     written = {mark + _plain(head) for head in heads for mark in ("v_", "a_")}  # as kineme writes them, of any name
     words = {head: _without(_spelled_out(head), _POSITION_WORDS) for head in heads}
-    noted = {head: {*parts} & (_DERIVATIVE_WORDS | _CONFIDENCE_WORDS) for head, parts in words.items()}
+    beside = _DERIVATIVE_WORDS | _CONFIDENCE_WORDS
+    noted = {
+        head: {*parts} & (beside | _STATES | {"tracking"} if _STATES & {*parts[-1:]} else beside)
+        for head, parts in words.items()
+    }
     places = {parts for head, parts in words.items() if not noted[head]}
     points = {_without(parts, _AXES) for parts in places if _AXES & {*parts}}
     return {head for head in heads if _plain(head) in written} | {
@@ -356,7 +363,12 @@ def beside_positions(heads: Sequence[str]) -> set[str]:
         for head, parts in words.items()
         if not _is_azimuth(head, heads)
         and noted[head]
-        and _without(parts, noted[head]) in (places if noted[head] <= _DERIVATIVE_WORDS else points)
+        and not DISCRETE_WORDS & {*parts}
+        and (
+            _without(parts, noted[head])
+            in (places if noted[head] <= _DERIVATIVE_WORDS else points - ({()} if "state" in parts else set()))
+            or ({*parts} in _ALONE and places)
+        )
     }
 
 
@@ -408,8 +420,18 @@ def counts_samples(head: str, beside: Iterable[str] = ()) -> bool:
         return True
     if not {*words} & _COUNTERS or not {*words} <= _COUNTERS | _BESIDE_COUNTERS:
         return False
-    others = {other for word in words for other in _NO_COUNTERS.get(word, ())}
-    return not (others and any(others & {*words_of(each)} for each in beside))
+    return not _names_thing(head, beside)
+
+
+def _names_thing(head: str, beside: Iterable[str]) -> bool:
+    """Tell whether a head with a word of counters names a finger or a line of a picture, to judge by those beside."""
+    others = {other for word in words_of(head) for other in _NO_COUNTERS.get(word, ())}
+    return bool(others) and any(others & {*words_of(each)} for each in beside)
+
+
+def may_count(head: str) -> bool:
+    """Tell whether a head is that of a counter if its values count, as ``frame``, ``world_index``, ``RDTSequence``."""
+    return counts_samples(head) or bool({*words_of(head)[-1:]} & {"sequence", "seq", "index", "idx", "counter"})
 
 
 def _counters(
@@ -419,8 +441,8 @@ def _counters(
 
     A movement ends where times, the first column `beside`, go back, or one of the others changes.
     """
-    several = [k for k in among if counts_samples(heads[k])]
-    certain = {k for k in several if counts_samples(heads[k], heads)}
+    certain = {k for k in among if counts_samples(heads[k], heads)}
+    several = [k for k in among if may_count(heads[k])]
     if values is None or not several:
         return certain
     times, *names = (None if k is None else values(k) for k in beside)
@@ -431,7 +453,8 @@ def _counters(
     return {
         k
         for k in several
-        if (k in certain and _OF_PANDAS_OR_THINGS.match(heads[k])) or _counts(values(k), apart, k not in certain)
+        if (k in certain and _OF_PANDAS_OR_THINGS.match(heads[k]))
+        or _counts(values(k), apart, _names_thing(heads[k], heads))
     }
 
 
@@ -458,6 +481,7 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
         or not head.strip()
         or _ROS_HEADER.fullmatch(head)
         or _UNNAMED.fullmatch(head)
+        or words_of(head)[-2:] == ("time", "fine")  # of Xsens, whose ticks begin anew
         or head in ("next.done", "next.success")  # the end of an episode of LeRobot
     ):
         return True
