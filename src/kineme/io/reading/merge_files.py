@@ -159,6 +159,7 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
             f"{first_names(counting, _NAMED)} may count movements that are read as one: the value changes after many "
             "samples, and never back; if so, say movement=, in the shell --movement"
         )
+    notes += dict.fromkeys(note for how, _ in detected for note in how.notes)
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
 
 
