@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
+from kineme.errors import DataError
 from kineme.io.reading.check_block import SENTINELS
 from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -260,6 +261,27 @@ def test_a_column_that_may_count_movements_is_noted(head, values, noted):
             "if so, say movement=, in the shell --movement"
         ] * (noted and len(several) == 1)
     assert len(read(lines(rows, f"t,p,{head}"), movement=head)) == len({*values.split()})
+
+
+@pytest.mark.parametrize(
+    ("heads", "names", "lengths"),
+    [
+        ("id,time,x", [(1000 + k,) for k in range(12)], [12]),
+        ("trial,id,time,x", [(k // 6, k % 6) for k in range(12)], [6, 6]),
+        ("trial,id,time,x", [(k % 2, k // 2) for k in range(12)], None),
+        ("action,time,x", [(k / 4,) for k in range(12)], None),
+        ("label,time,x", [("ab"[k % 2],) for k in range(12)], None),
+    ],
+)
+def test_an_id_that_is_new_in_each_sample_tells_no_movements_apart(heads, names, lengths):
+    text = lines([(*name, k, k * k) for k, name in enumerate(names)], heads)
+    if lengths is None:
+        with pytest.raises(DataError, match=r"at least 4 samples, got fewer in each, told apart by \[.*--exclude"):
+            read(text)
+        return
+    recordings = read(text)
+    assert recordings.demonstrations.lengths.tolist() == lengths
+    assert recordings.detected[0][0].ignored == ("id",)
 
 
 def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():

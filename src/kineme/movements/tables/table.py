@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, no_time
-from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, no_lines
+from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
     in_seconds,
@@ -74,6 +74,8 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     names = {*roles.movement, roles.label}
     columns = [_names(column) if k in names else column for k, column in enumerate(table.columns)]
     table = replace(table, columns=columns)
+    if layout.keys is None:
+        roles = _without_counted(table, roles)
     times, units, units_from = _times(table, roles, layout)
     # Refuse several columns of times that do not show the same clock.
     for k in roles.clocks:
@@ -84,6 +86,12 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
             raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
+    told_by = [table.heads[k] for k in (*roles.movement, roles.label) if k is not None]
+    if told_by and (layout.keys or layout.label) is None and len(codes) >= MIN_SAMPLES > np.bincount(codes).max():
+        raise DataError(
+            f"expected movements of at least {MIN_SAMPLES} samples, got fewer in each, told apart by {listed(told_by)}"
+            "; if it tells none apart, leave it aside with exclude=, in the shell --exclude"
+        )
     people: list[str | None] | None = None
     if roles.person is not None:  # who showed the first sample of each movement
         shown = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
@@ -111,6 +119,22 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+
+
+def _without_counted(table: Table, roles: Roles) -> Roles:
+    """Leave a column aside that is named as one of movements, and counts samples: its value is new in each."""
+    for k in roles.movement:
+        values = table.columns[k]
+        alone = words_of(table.heads[k]) == ("id",) or len(roles.movement) == 1
+        if k == roles.person or not alone or len(values) < 2 or (values[1:] == values[:-1]).any():
+            continue
+        told_by = [table.columns[i].tolist() for i in (*roles.movement, roles.label) if i is not None]
+        lengths = [len(values)] if table.segments is None else np.diff(table.segments.offsets)
+        told_by.append(np.repeat(np.arange(len(lengths)), lengths).tolist())
+        if len({*zip(*told_by, strict=True)}) == len(values):
+            movement = tuple(i for i in roles.movement if i != k)
+            return roles._replace(movement=movement, ignored=(*roles.ignored, k))
+    return roles
 
 
 def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArray[np.intp] | None) -> tuple[str, ...]:
