@@ -264,6 +264,31 @@ def test_a_column_that_may_count_movements_is_noted(head, values, noted):
 
 
 @pytest.mark.parametrize(
+    ("head", "names", "apart", "noted"),
+    [
+        ("sensor", ["acc", "gyro"], 9.0, True),
+        ("sensor_type", [1, 4], 9.0, True),
+        ("kind", ["a", "b", "c"], 9.0, True),
+        ("hand", ["left", "right"], 0.0, True),  # named so, though they are as near to each other as to themselves
+        ("kind", ["a", "b"], 0.0, False),
+        ("gripper", [0, 1], 9.0, False),
+    ],
+)
+@pytest.mark.parametrize("batch", [1, 5])
+def test_rows_of_several_things_in_turns_are_noted(head, names, apart, noted, batch):
+    turn = [k // batch % len(names) for k in range(60)]
+    rows = [(k / 10, names[i], apart * i + np.sin(k / 9), 1.0) for k, i in enumerate(turn)]
+    recordings = read(lines(rows, f"t,{head},x,y"))
+    if noted and (apart or batch == 1):
+        (note,) = recordings.notes
+        assert f"which {head} names in turns" in note
+        assert "--movement" in note
+        assert read(lines(rows, f"t,{head},x,y"), movement=head).notes == ()
+    else:
+        assert recordings.notes == ()
+
+
+@pytest.mark.parametrize(
     ("heads", "names", "lengths"),
     [
         ("id,time,x", [(1000 + k,) for k in range(12)], [12]),

@@ -167,6 +167,7 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _tree_movements(entries: Any, layout: Layout, kind: str) -> Parsed:
     notes: list[str] = []
     parsed = tree_movements(_as_tree(entries, notes), layout, kind, many="take")
+    notes += parsed.detected.notes
     return parsed._replace(detected=parsed.detected._replace(notes=tuple(dict.fromkeys(notes))))
 
 

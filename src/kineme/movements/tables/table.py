@@ -36,6 +36,9 @@ _NUMBERS = (Real, Decimal)
 #: Cell in lower case -> number.
 FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
 _BLOCKS = 3  # values of a column that may tell movements apart, at least
+_THINGS = frozenset({"sensor", "hand", "marker", "joint"})  # that rows may be of in turns
+_MOST_THINGS = (8, 64)  # in a column that tells them apart by numbers, by texts
+_JUMP = 2.0  # times as far from the row before as from the last row of the same thing
 _WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
@@ -116,6 +119,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
         in_blocks=_in_blocks(table, roles, codes, rows),
+        notes=_note_on_turns(table, roles, positions, codes, rows),
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
@@ -161,6 +165,53 @@ def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArra
         if counts:
             heads.append(table.heads[k])
     return tuple(heads)
+
+
+def _note_on_turns(
+    table: Table, roles: Roles, positions: Array, codes: NDArray[np.intp], rows: NDArray[np.intp] | None
+) -> tuple[str, ...]:
+    """Say which column tells rows of several things apart, in turns, that are read as one movement."""
+    for k in (*roles.ignored, *roles.positions):
+        values = table.columns[k]
+        if values is None or DISCRETE_WORDS & {*words_of(table.heads[k])}:
+            continue
+        others = positions[:, [i for i, place in enumerate(roles.positions) if place != k]]
+        if _are_in_turns(table.heads[k], values if rows is None else values[rows], others, codes):
+            return (
+                f"rows of several things may be mixed in one movement, which {table.heads[k]} names in turns; if so, "
+                "say movement=, in the shell --movement",
+            )
+    return ()
+
+
+def _are_in_turns(head: str, values: NDArray[Any], x: Array, codes: NDArray[np.intp]) -> bool:
+    """Tell whether values name things of which rows are in turns: each goes on where it was, not where others are.
+
+    `x` are the other coordinates (T, d), `codes` the movements. Texts or whole numbers, few, that come back.
+    """
+    changed = np.flatnonzero((values[1:] != values[:-1]) & (codes[1:] == codes[:-1])) + 1
+    are_texts = values.dtype.kind == "O"
+    if len(changed) < MIN_SAMPLES or not (are_texts or np.all(values == np.rint(values))):
+        return False
+    several = {*values.tolist()}
+    if len(several) > _MOST_THINGS[are_texts]:
+        return False
+    if _THINGS & {*words_of(head)} and 2 * len(changed) >= len(values):
+        return True
+    number_of = {value: number for number, value in enumerate(several)}
+    things = np.array([number_of[value] for value in values.tolist()]) + len(several) * codes
+    order = np.argsort(things, kind="stable")
+    before = np.full(len(values), -1)
+    before[order[1:]] = np.where(np.diff(things[order]) == 0, order[:-1], -1)
+    back = changed[before[changed] >= 0]
+    if len(back) < MIN_SAMPLES or not x.shape[1]:
+        return False
+    extent = np.fmax.reduce(x) - np.fmin.reduce(x)
+    far, near = (
+        float(np.median(np.nansum(np.abs(x[back] - x[rows]) / np.where(extent > 0, extent, 1.0), axis=1)))
+        for rows in (back - 1, before[back])
+    )
+    return far > _JUMP * near
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
