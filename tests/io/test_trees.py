@@ -350,6 +350,29 @@ def test_a_body_that_is_found_again_has_its_place_and_is_noted():
     )
 
 
+def test_steps_of_rlds_have_flags_and_what_was_told():
+    def steps(told):
+        return [
+            {
+                "observation": {"state": x},
+                "gripper": k > 5,
+                "is_first": k == 0,
+                "reward": 1.0,
+                "language_instruction": told,
+            }
+            for k, x in enumerate(X.tolist())
+        ]
+
+    recordings = read_json([{"steps": steps("pick")}, {"steps": steps("put")}], units=0.1)
+    assert recordings.labels.tolist() == ["pick", "put"]
+    assert recordings.detected[0][0].columns == ("observation.state.0", "observation.state.1", "gripper")
+    assert read_json([{"steps": steps("")}], units=0.1).labels.tolist() == [None]
+    recordings = read_json(
+        [sample | {"is_first": k == 0} for k, sample in enumerate(SAMPLES)], columns=["x", "is_first"]
+    )
+    assert recordings.detected[0][0].columns == ("x", "is_first")
+
+
 def test_an_axis_that_is_a_list_runs_over_time():
     rows = [{"label": label, "x": (X[:, 0] + k).tolist(), "y": X[:, 1].tolist()} for k, label in enumerate("ab")]
     recordings = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)

@@ -412,7 +412,7 @@ def _array(values: list[Any], where: str = "") -> Any:
     if width:
         values = [[np.nan] * width if value is None else value for value in values]
     try:
-        return np.array(values, dtype=np.float64)
+        return np.array(values, dtype=np.bool_ if {*map(type, values)} == {bool} else np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
             f"expected samples of one length{where}, each a list of numbers, got rows that differ in length or "

@@ -41,6 +41,7 @@ from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
 _OF_RATE = "\0rate"  # owner of the times that follow from a rate, which no array is called
+_INSTRUCTIONS = frozenset({"language_instruction", "natural_language_instruction", "instruction"})  # in each step
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
@@ -60,7 +61,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     # Beside others x may be a label, as of letters, but not where it is the only name.
     unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
     movements = [
-        movement._replace(label=movement.label or (None if movement.name in unnamed else movement.name))
+        movement._replace(
+            label=movement.label or _instruction(movement) or (None if movement.name in unnamed else movement.name)
+        )
         for movement in movements
     ]
     stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
@@ -85,7 +88,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
         heads, owners = (*heads, STAMP), (*owners, _OF_RATE)
-    kinds = ["text" if owner != _OF_RATE and is_text(first.entries[owner]) else "number" for owner in owners]
+    kinds = ["number" if owner == _OF_RATE else _kind(first.entries[owner]) for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
@@ -105,6 +108,18 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     detected = parsed.detected._replace(ignored=(*parsed.detected.ignored, *static))
     left_out = (*parsed.left_out, *unused)
     return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None, left_out=left_out)
+
+
+def _kind(array: Any) -> str:
+    return "text" if is_text(array) else "flag" if array.dtype.kind == "b" and len(array.shape) == 1 else "number"
+
+
+def _instruction(movement: TreeMovement) -> str | None:
+    """Return what a robot was told, the same in each step, as RLDS has it."""
+    for name, entry in movement.entries.items():
+        if name.rpartition(".")[2] in _INSTRUCTIONS and is_text(entry) and len({*_texts(entry)}) == 1:
+            return _texts(entry)[0] or None
+    return None
 
 
 def _unused_labels(tree: Any, movements: Sequence[TreeMovement]) -> list[str]:
