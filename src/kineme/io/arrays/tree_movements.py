@@ -34,9 +34,9 @@ from kineme.io.arrays.trees import (
     movements_in,
 )
 from kineme.io.limits import check_expanded
-from kineme.movements.tables.columns import choose_roles, is_time
+from kineme.movements.tables.columns import choose_roles, counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
-from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.movements.tables.table import Segments, Table, skipping, table_movements
 from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
@@ -101,7 +101,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         return None if entry is None else np.asarray(entry).reshape(first.length, -1)[:, k - owners.index(owners[k])]
 
     roles = choose_roles(heads, kinds, layout, values=values)
-    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
+    counters = [k for k in roles.ignored if roles.time is None and counts_samples(heads[k], heads)]
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks, *counters]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
@@ -291,6 +292,13 @@ def _part(movement: TreeMovement, name: str, length: int, kind: tuple[int, bool,
     width, of_texts, of_time = kind
     if name == _OF_RATE:
         stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
+        counters = [entry for name, entry in movement.entries.items() if counts_samples(name, movement.entries)]
+        counted = [skipping(entry, np.array([0, length])) for entry in counters if entry.shape == (length,)]
+        if (
+            movement.rate is not None
+            and (frames := next((each for each in counted if each is not None), None)) is not None
+        ):
+            stamps = frames / movement.rate.hertz
         return stamps[:, None], "" if movement.rate else "expected a rate as others have, got none"
     entry = movement.entries.get(name)
     if entry is None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, no_time
+from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, counts_samples, no_time
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
@@ -104,7 +104,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         positions, times, codes = positions[rows], times[rows], codes[rows]
     offsets = np.searchsorted(codes, np.arange(n + 1))
     if roles.time is None:
-        times = (np.arange(len(times)) - np.repeat(offsets[:-1], np.diff(offsets))) * float(units)
+        times = _samples_so_far(table, roles, offsets, rows) * float(units)
     heads = table.heads
     detected = Detected(
         f"{table.maker} {kind}".strip(),
@@ -165,6 +165,37 @@ def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArra
         if counts:
             heads.append(table.heads[k])
     return tuple(heads)
+
+
+def _samples_so_far(
+    table: Table, roles: Roles, offsets: NDArray[np.intp], rows: NDArray[np.intp] | None
+) -> NDArray[np.float64]:
+    """Count the samples before each one of its movement, with those that a counter of samples skips."""
+    for k in roles.ignored:
+        if counts_samples(table.heads[k], table.heads) and (values := table.columns[k]) is not None:
+            counted = skipping(values if rows is None else values[rows], offsets)
+            if counted is not None:
+                return counted
+    return np.arange(float(offsets[-1])) - np.repeat(offsets[:-1], np.diff(offsets))
+
+
+def skipping(counter: Any, offsets: NDArray[np.intp]) -> NDArray[np.float64] | None:
+    """Count the samples since each movement began, by a counter that goes on by 1 but for some that it skips; or None.
+
+    One that goes on by 2 says nothing of the time between two samples, and one that goes back is none.
+    """
+    try:
+        numbers = np.asarray(counter, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    inner = np.ones(max(len(numbers) - 1, 0), dtype=bool)
+    inner[offsets[1:-1] - 1] = False
+    steps = np.diff(numbers)[inner]
+    if not len(steps) or not (steps >= 1).all() or np.median(steps) != 1 or steps.max() == 1:
+        return None
+    if not np.all(steps == np.rint(steps)):
+        return None
+    return numbers - np.repeat(numbers[offsets[:-1]], np.diff(offsets))
 
 
 def _note_on_turns(
