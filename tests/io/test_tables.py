@@ -382,7 +382,11 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
 @pytest.mark.parametrize(
     ("times", "reason", "remaining"),
     [
-        ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
+        (
+            (0, 1, 1, 2, 3, 4),
+            "got duplicate stamps 1 and 1 s at sample 2; leave such samples out with --skip sample",
+            [0, 1, 2, 3, 4],
+        ),
         (
             (0, 1, 2, 1.5, 1.7, 3),
             "got decreasing stamps 2 and 1.5 s at sample 3; if several movements .*, --movement",
@@ -461,6 +465,13 @@ def test_dates_are_time_stamps(style, between, head):
     assert recordings.demonstrations.times[0] == 1714979289 - offset
     assert recordings.detected[0][0][4:6] == ("s", "dates")
     assert recordings.demonstrations.n_dims == 2
+
+
+def test_minutes_and_seconds_with_a_fraction_are_times_and_without_one_may_be_hours():
+    rows = [(f"01:{k / 4:06.3f}", k, -k) for k in range(6)]
+    assert read(lines(rows)).demonstrations[0].times.tolist() == [60 + k / 4 for k in range(6)]
+    with pytest.raises(DataError, match="'01:00'"):
+        read(lines([(row[0][:5], *row[1:]) for row in rows]))
 
 
 def test_a_cell_that_is_no_date_is_found_by_its_line():

@@ -373,6 +373,14 @@ def test_steps_of_rlds_have_flags_and_what_was_told():
     assert recordings.detected[0][0].columns == ("x", "is_first")
 
 
+def test_times_that_are_null_are_left_aside_and_those_in_quotes_are_named():
+    nulls = [sample | {"t": None} for sample in SAMPLES]
+    assert read_json({"fps": 10, "frames": nulls}).demonstrations[0].times.tolist() == T.tolist()
+    assert read_json(nulls, units=0.1).demonstrations.n_dims == 2
+    with pytest.raises(DataError, match=r"in 't', got the text '0\.0'; write numbers without quotes"):
+        read_json([sample | {"t": str(sample["t"])} for sample in SAMPLES])
+
+
 def test_an_axis_that_is_a_list_runs_over_time():
     rows = [{"label": label, "x": (X[:, 0] + k).tolist(), "y": X[:, 1].tolist()} for k, label in enumerate("ab")]
     recordings = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import arrays_movements, has_known_names
-from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.arrays.tree_movements import no_stamp, tree_movements
 from kineme.io.limits import check_expanded
 from kineme.io.records import needs
 from kineme.io.ros.bags import REMEDIES, records_of_mcap, refused
@@ -143,7 +143,7 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
         if is_time(head) and any(isinstance(cell, str) for cell in cells):
             seconds, others = seconds_of_dates([str(cell) for cell in cells])
             if others:
-                raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
+                raise no_stamp(head, others)
             tree[f"{head} (s)"] = seconds
         else:
             tree[head] = _array(cells, f" in {head!r}")

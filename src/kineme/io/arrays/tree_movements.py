@@ -34,6 +34,7 @@ from kineme.io.arrays.trees import (
     movements_in,
 )
 from kineme.io.limits import check_expanded
+from kineme.io.tables.dialect import is_number
 from kineme.movements.tables.columns import choose_roles, counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, skipping, table_movements
@@ -219,13 +220,22 @@ def _plainly_named(movement: TreeMovement) -> TreeMovement:
 def _with_seconds(movement: TreeMovement) -> TreeMovement:
     """Return times that are texts, if no others are there, as the seconds, which their head then says."""
     times = [name for name in movement.entries if is_time(name)]
-    if len(times) != 1 or not is_text(movement.entries[times[0]]) or not any(_texts(movement.entries[times[0]])):
+    if len(times) != 1 or not is_text(movement.entries[times[0]]):
         return movement
-    seconds, odd = seconds_of_dates(_texts(movement.entries[times[0]]))
-    if odd:
-        raise DataError(f"expected dates or durations in {times[0]!r}, got {next(iter(odd.values()))!r:.80}")
     others = {name: entry for name, entry in movement.entries.items() if name != times[0]}
+    if not any(texts := _texts(movement.entries[times[0]])):  # of nulls alone
+        return movement._replace(entries=others)
+    seconds, odd = seconds_of_dates(texts)
+    if odd:
+        raise no_stamp(times[0], odd)
     return movement._replace(entries={f"{times[0]} (s)": seconds} | others)
+
+
+def no_stamp(head: str, odd: Mapping[int, str]) -> DataError:
+    """Return the error of texts in a column of times."""
+    got = next(iter(odd.values()))
+    quoted = "; write numbers without quotes" if is_number(got, False) else ""
+    return DataError(f"expected dates or durations in {head!r}, got the text {got!r:.80}{quoted}")
 
 
 def _texts(array: Any) -> list[str]:

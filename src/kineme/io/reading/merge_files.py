@@ -44,6 +44,7 @@ NAMES = ("people", "person", "subjects", "subject")
 _DEPTH = 3  # person/label/recording
 
 _HINT = "check the order of the columns, or divide the quaternions by their norms"
+_LOST = "nothing was tracked there; leave such samples out with skip='sample', in the shell --skip sample"
 
 
 class Source(NamedTuple):
@@ -274,7 +275,7 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
         owners = np.searchsorted(block.offsets, odd, side="right") - 1
         reasons = [
             f"expected unit quaternions in {', '.join(channel.columns)}, got norm {norms[k]:.6g} at sample "
-            f"{k - block.offsets[i]}; {_HINT}"
+            f"{k - block.offsets[i]}; {_HINT if norms[k] or skip == 'sample' else _LOST}"
             for i, k in zip(owners.tolist(), odd.tolist(), strict=True)
         ]
         faults |= dict(zip((block.row(k) for k in odd.tolist()), reasons, strict=True))
