@@ -169,3 +169,21 @@ def test_long_stretches_of_such_a_number_are_refused_as_gaps(tmp_path):
     lost = np.where((U > 0.2) & (U < 0.8), -9999, np.sin(U))
     with pytest.raises(kineme.errors.KinemeError, match=r"got nothing in .*--fill-gaps"):
         kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))
+
+
+@pytest.mark.parametrize("to", ["csv", "parquet", "json", "rated", "frame"])
+@pytest.mark.parametrize(("step", "skips"), [(1, True), (2, False)])
+def test_samples_that_a_counter_skips_take_their_time(tmp_path, to, step, skips):
+    frames = step * np.array([*range(20), *range(30, 60)])
+    table, path = pd.DataFrame({"frame": frames, "x": np.sin(frames)}), tmp_path / f"a.{to}"
+    if to == "frame":
+        movement = kineme.Demonstrations.from_dataframe(table, units=0.1)[0]
+    elif to == "rated":
+        path = tmp_path / "a.json"
+        path.write_text(f'{{"fps": 10, "frames": {table.to_json(orient="records")}}}')
+        movement = kineme.read_recordings(path).demonstrations[0]
+    else:
+        write = {"csv": table.to_csv, "parquet": table.to_parquet}.get(to)
+        write(path, index=False) if write else table.to_json(path, orient="records")
+        movement = kineme.read_recordings(path, units=0.1).demonstrations[0]
+    np.testing.assert_allclose(movement.times - movement.times[0], 0.1 * (frames if skips else np.arange(50)))

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
+from kineme.errors import DataError
 from kineme.io.reading.check_block import SENTINELS
 from kineme.io.reading.recordings import read_recordings
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -262,6 +263,52 @@ def test_a_column_that_may_count_movements_is_noted(head, values, noted):
     assert len(read(lines(rows, f"t,p,{head}"), movement=head)) == len({*values.split()})
 
 
+@pytest.mark.parametrize(
+    ("head", "names", "apart", "noted"),
+    [
+        ("sensor", ["acc", "gyro"], 9.0, True),
+        ("sensor_type", [1, 4], 9.0, True),
+        ("kind", ["a", "b", "c"], 9.0, True),
+        ("hand", ["left", "right"], 0.0, True),  # named so, though they are as near to each other as to themselves
+        ("kind", ["a", "b"], 0.0, False),
+        ("gripper", [0, 1], 9.0, False),
+    ],
+)
+@pytest.mark.parametrize("batch", [1, 5])
+def test_rows_of_several_things_in_turns_are_noted(head, names, apart, noted, batch):
+    turn = [k // batch % len(names) for k in range(60)]
+    rows = [(k / 10, names[i], apart * i + np.sin(k / 9), 1.0) for k, i in enumerate(turn)]
+    recordings = read(lines(rows, f"t,{head},x,y"))
+    if noted and (apart or batch == 1):
+        (note,) = recordings.notes
+        assert f"which {head} names in turns" in note
+        assert "--movement" in note
+        assert read(lines(rows, f"t,{head},x,y"), movement=head).notes == ()
+    else:
+        assert recordings.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("heads", "names", "lengths"),
+    [
+        ("id,time,x", [(1000 + k,) for k in range(12)], [12]),
+        ("trial,id,time,x", [(k // 6, k % 6) for k in range(12)], [6, 6]),
+        ("trial,id,time,x", [(k % 2, k // 2) for k in range(12)], None),
+        ("action,time,x", [(k / 4,) for k in range(12)], None),
+        ("label,time,x", [("ab"[k % 2],) for k in range(12)], None),
+    ],
+)
+def test_an_id_that_is_new_in_each_sample_tells_no_movements_apart(heads, names, lengths):
+    text = lines([(*name, k, k * k) for k, name in enumerate(names)], heads)
+    if lengths is None:
+        with pytest.raises(DataError, match=r"at least 4 samples, got fewer in each, told apart by \[.*--exclude"):
+            read(text)
+        return
+    recordings = read(text)
+    assert recordings.demonstrations.lengths.tolist() == lengths
+    assert recordings.detected[0][0].ignored == ("id",)
+
+
 def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
     rows = [(label, *row) for label in ("wave", "wave", "rest", "wave") for row in SIX]
     rows += [("nod", 100 + row[0], *row[1:]) for row in SIX]
@@ -335,7 +382,11 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
 @pytest.mark.parametrize(
     ("times", "reason", "remaining"),
     [
-        ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
+        (
+            (0, 1, 1, 2, 3, 4),
+            "got duplicate stamps 1 and 1 s at sample 2; leave such samples out with --skip sample",
+            [0, 1, 2, 3, 4],
+        ),
         (
             (0, 1, 2, 1.5, 1.7, 3),
             "got decreasing stamps 2 and 1.5 s at sample 3; if several movements .*, --movement",
@@ -414,6 +465,13 @@ def test_dates_are_time_stamps(style, between, head):
     assert recordings.demonstrations.times[0] == 1714979289 - offset
     assert recordings.detected[0][0][4:6] == ("s", "dates")
     assert recordings.demonstrations.n_dims == 2
+
+
+def test_minutes_and_seconds_with_a_fraction_are_times_and_without_one_may_be_hours():
+    rows = [(f"01:{k / 4:06.3f}", k, -k) for k in range(6)]
+    assert read(lines(rows)).demonstrations[0].times.tolist() == [60 + k / 4 for k in range(6)]
+    with pytest.raises(DataError, match="'01:00'"):
+        read(lines([(row[0][:5], *row[1:]) for row in rows]))
 
 
 def test_a_cell_that_is_no_date_is_found_by_its_line():

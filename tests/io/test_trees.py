@@ -312,6 +312,75 @@ def test_parts_of_a_sample_are_told_by_their_names_and_not_by_their_places():
     assert read_json([{"session": 1, "gestures": [{"samples": SAMPLES}]}]).labels.tolist() == [None]
 
 
+@pytest.mark.parametrize(
+    ("key", "ids", "names"),
+    [
+        *((key, (7, 12), "01") for key in ("id", "tracking_id", "trackingId", "body_id", "person_id", "track_id")),
+        ("type", ("left", "right"), ("left", "right")),
+        ("marker_id", (7, 12), ("7", "12")),
+    ],
+)
+def test_bodies_are_told_apart_by_their_ids(key, ids, names):
+    """What a device numbers anew is counted; hands of a Leap also have a type, which says more than their id."""
+    of_leap = {"left": {"id": 5}, "right": {"id": 9}}
+
+    def sample(k):
+        parts = [
+            {key: i, **of_leap.get(i, {}), "position": {"x": x, "y": y}}
+            for i, (x, y) in zip(ids, X[:2].tolist(), strict=True)
+        ]
+        return {"t": k / 10, "bodies": [{**part, "age": 1.0 * k} for part in parts[:: -1 if k % 7 > 3 else 1]]}
+
+    demos = read_json([sample(k) for k in range(10)]).demonstrations
+    heads = ("position.x", "position.y", "age")
+    assert {*demos.dimensions} == {f"bodies.{name}.{head}" for name in names for head in heads}
+    places = [demos.dimensions.index(f"bodies.{name}.position.x") for name in names]
+    np.testing.assert_array_equal(demos[0].positions[:, places], np.tile(X[:2, 0], (10, 1)))
+
+
+def test_a_body_that_is_found_again_has_its_place_and_is_noted():
+    def frame(k, *ids):
+        return {"t": k / 10, "hands": [{"id": i, "palm": [1.0 * k, i % 10, 1.0]} for i in ids]}
+
+    recordings = read_json([frame(k, *((13, 12) if k < 4 else (13,) if k < 5 else (22, 13))) for k in range(10)])
+    assert recordings.demonstrations.dimensions == tuple(f"hands.{k}.palm.{i}" for k in (1, 0) for i in range(3))
+    np.testing.assert_array_equal(recordings.demonstrations[0].positions[:, [1, 4]], [[3, 2]] * 10)
+    assert recordings.notes == (
+        "hands.0 had the ids 12, 22 one after the other, and is read as one; look whether it is the same",
+    )
+
+
+def test_steps_of_rlds_have_flags_and_what_was_told():
+    def steps(told):
+        return [
+            {
+                "observation": {"state": x},
+                "gripper": k > 5,
+                "is_first": k == 0,
+                "reward": 1.0,
+                "language_instruction": told,
+            }
+            for k, x in enumerate(X.tolist())
+        ]
+
+    recordings = read_json([{"steps": steps("pick")}, {"steps": steps("put")}], units=0.1)
+    assert recordings.labels.tolist() == ["pick", "put"]
+    assert recordings.detected[0][0].columns == ("observation.state.0", "observation.state.1", "gripper")
+    assert read_json([{"steps": steps("")}], units=0.1).labels.tolist() == [None]
+    recordings = read_json(
+        [sample | {"is_first": k == 0} for k, sample in enumerate(SAMPLES)], columns=["x", "is_first"]
+    )
+    assert recordings.detected[0][0].columns == ("x", "is_first")
+
+
+def test_times_that_are_null_are_left_aside_and_those_in_quotes_are_named():
+    nulls = [sample | {"t": None} for sample in SAMPLES]
+    assert read_json({"fps": 10, "frames": nulls}).demonstrations[0].times.tolist() == T.tolist()
+    assert read_json(nulls, units=0.1).demonstrations.n_dims == 2
+    with pytest.raises(DataError, match=r"in 't', got the text '0\.0'; write numbers without quotes"):
+        read_json([sample | {"t": str(sample["t"])} for sample in SAMPLES])
+
+
 def test_an_axis_that_is_a_list_runs_over_time():
     rows = [{"label": label, "x": (X[:, 0] + k).tolist(), "y": X[:, 1].tolist()} for k, label in enumerate("ab")]
     recordings = read("\n".join(map(json.dumps, rows)), "a.jsonl", units=0.1)
@@ -412,6 +481,41 @@ def test_hands_of_a_frame_are_told_apart_by_what_they_are_held_for(tmp_path, key
     frames = [{"frame": k, "landmarks": [_landmarks(k), _landmarks(k + 1)][: 1 + k]} for k in range(20)]
     with pytest.raises(DataError, match="as many 'landmarks' in each sample"):
         read()
+
+
+@pytest.mark.parametrize(
+    ("hands", "held", "names"),
+    [
+        # The older solutions, as protobuf's MessageToDict writes them, and in JavaScript.
+        (
+            lambda points: {"landmark": points},
+            lambda side: {"classification": [{"index": 0, "score": 0.9, "label": side}]},
+            ("multi_hand_landmarks", "multi_handedness", ".landmark"),
+        ),
+        (list, lambda side: {"index": 0, "score": 0.9, "label": side}, ("multiHandLandmarks", "multiHandedness", "")),
+        (list, str, ("landmarks", "handedness", "")),
+    ],
+)
+def test_older_answers_say_which_hand_it_is(hands, held, names):
+    def frames(sides):
+        return [
+            {
+                "timestamp": 33 * k,
+                "gestures": [[{"index": -1, "score": 0.5, "categoryName": "fist"}] for _ in sides(k)],
+                names[0]: [hands(_landmarks(k + (side == "Right"))) for side in sides(k)],
+                names[1]: [*map(held, sides(k))],
+            }
+            for k in range(20)
+        ]
+
+    demos = read_json(frames(lambda k: ["Left", "Right"][:: -1 if k % 7 > 3 else 1])).demonstrations
+    assert demos.dimensions == tuple(
+        f"{names[0]}.{side}{names[2]}.{k}.{axis}" for side in ("Left", "Right") for k in range(5) for axis in "xyz"
+    )
+    np.testing.assert_array_equal(demos[0].positions[1:, 0], demos[0].positions[:-1, 15])
+    recordings = read_json(frames(lambda k: ["Left" if k < 9 else "Right"]))
+    assert recordings.demonstrations.dimensions[0] == f"{names[0]}.0{names[2]}.0.x"
+    assert recordings.notes == ("one hand is Left and Right in turns, and read as one; look whether it is",)
 
 
 def test_bodies_of_frames_are_read_beside_the_bones_between_their_joints(tmp_path):

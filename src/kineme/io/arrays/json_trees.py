@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.arrays.arrays import arrays_movements, has_known_names
-from kineme.io.arrays.tree_movements import tree_movements
+from kineme.io.arrays.tree_movements import no_stamp, tree_movements
 from kineme.io.limits import check_expanded
 from kineme.io.records import needs
 from kineme.io.ros.bags import REMEDIES, records_of_mcap, refused
@@ -22,6 +23,7 @@ from kineme.movements.channels.column_match import with_unit
 from kineme.movements.tables.columns import counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed
 from kineme.movements.tables.time_stamps import is_date, seconds_of_dates, words_of
+from kineme.reporting.text import first_names
 from kineme.units import is_unit_of
 
 _RECORDED = "timestamp [s]"  # head of the times of the recording
@@ -30,10 +32,19 @@ _CHECKED = 2**12  # messages between two looks at the memory
 
 _PARTS = ("name", "part", "bodypart", "joint", "handedness", "side")  # names of a part of a sample
 _NAMES = (*_PARTS, "label", "id")  # also of movements and samples
+_SAID = (*_PARTS, "type", "label")  # before numbers
+_LEFT_OR_RIGHT = frozenset({"left", "right"})
+_THINGS = frozenset({"marker", "joint", "keypoint", "landmark", "point", "object"})  # marker_id
+_FOUND = frozenset({"tracking", "track", "body", "person", "hand", "user", "player", "skeleton"})  # tracking_id
+_BODIES = frozenset({"hands", "bodies", "people", "persons", "users", "players", "skeletons"})
+_GIVEN = re.compile(r"\0id(\d+)")  # the number that a device gave a body, in the name of a column
+_NAMED = 6  # numbers of bodies in a note
 _OPENPOSE = re.compile(r"\w+_keypoints_[23]d")
 _UNITS = ("unit", "units")
-_COUNT, _HANDS = "\0count", "\0hands"  # of parts without names
-_SIDES = ("categoryName", "category_name")  # where MediaPipe says which hand it is, in JavaScript and in Python
+_COUNT, _HANDS, _SIDE = "\0count", "\0hands", "\0side"  # of parts without names
+# Where MediaPipe says which hand it is, in JavaScript, in Python and in its older solutions, and what is beside that.
+_SIDES = ("categoryName", "category_name", "label")
+_BESIDE_SIDE = frozenset({"index", "score", "displayName", "display_name", *_SIDES})
 _NO_HANDS = frozenset({"pose", "face", "body"})
 _AXES = frozenset("xyz")
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
@@ -64,7 +75,7 @@ def _parsed(entries: Any, layout: Layout) -> Parsed:
             return arrays_movements(entries, layout, "JSON")
     elif not isinstance(entries, list) or not any(isinstance(entry, (Mapping, list)) for entry in entries[:1]):
         raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
-    return tree_movements(as_tree(entries), layout, "JSON", many="take")
+    return _tree_movements(entries, layout, "JSON")
 
 
 def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
@@ -80,7 +91,7 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
             raise DataError(f"expected JSON in line {k}, got {line.strip()[:40]!r} ({error.msg}); repair it") from error
     if not entries:
         raise DataError("expected samples, got an empty file")
-    return tree_movements(as_tree(entries), layout, "JSON lines", many="take")
+    return _tree_movements(entries, layout, "JSON lines")
 
 
 def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
@@ -132,7 +143,7 @@ def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
         if is_time(head) and any(isinstance(cell, str) for cell in cells):
             seconds, others = seconds_of_dates([str(cell) for cell in cells])
             if others:
-                raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
+                raise no_stamp(head, others)
             tree[f"{head} (s)"] = seconds
         else:
             tree[head] = _array(cells, f" in {head!r}")
@@ -153,8 +164,15 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return entries
 
 
-def as_tree(value: Any) -> Any:
-    """Return parsed JSON as a tree of arrays."""
+def _tree_movements(entries: Any, layout: Layout, kind: str) -> Parsed:
+    notes: list[str] = []
+    parsed = tree_movements(_as_tree(entries, notes), layout, kind, many="take")
+    notes += parsed.detected.notes
+    return parsed._replace(detected=parsed.detected._replace(notes=tuple(dict.fromkeys(notes))))
+
+
+def _as_tree(value: Any, notes: list[str]) -> Any:
+    """Return parsed JSON as a tree of arrays, and note what may be wrong."""
     if isinstance(value, Mapping):
         if any(_OPENPOSE.fullmatch(name) for name in value):
             raise DataError(
@@ -167,7 +185,7 @@ def as_tree(value: Any) -> Any:
                 if name.lower() == "strokes" and isinstance(entry, list) and all(map(_are_objects, entry)):
                     value = {**value, name: [point for stroke in entry for point in stroke]}
         stamped = {len(entry) for name, entry in value.items() if is_time(name) and isinstance(entry, list)}
-        tree = {name: as_tree(entry) for name, entry in value.items()}
+        tree = {name: _as_tree(entry, notes) for name, entry in value.items()}
         return {
             name: _stacked(entry) if isinstance(entry, list) and len(entry) in stamped else entry
             for name, entry in tree.items()
@@ -175,7 +193,7 @@ def as_tree(value: Any) -> Any:
     if not isinstance(value, list) or not value:
         return value
     if all(isinstance(element, Mapping) for element in value):
-        return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(element) for element in value]
+        return _columns(value, notes) if all(map(_is_sample, value[:2])) else [_as_tree(each, notes) for each in value]
     if any(isinstance(element, Mapping) for element in value):
         raise DataError("expected a list of samples or of movements, got objects beside other values")
     if all(
@@ -185,7 +203,7 @@ def as_tree(value: Any) -> Any:
     if all(isinstance(row, list) for row in value) and not all(
         not isinstance(cell, (list, Mapping)) for row in value for cell in row[:1]
     ):
-        return [as_tree(element) for element in value]
+        return [_as_tree(element, notes) for element in value]
     return _array(value)
 
 
@@ -204,7 +222,7 @@ def _is_sample(entry: Mapping[str, Any]) -> bool:
     for name, value in entry.items():
         if is_time(name) or counts_samples(name, entry):
             return not isinstance(value, list)
-    if any(map(_sides, entry.values())):
+    if any(_sides(name, value) for name, value in entry.items()):
         return True
     if any(  # objects that each have a name and numbers: the points of a body at one time
         isinstance(value, list)
@@ -227,14 +245,87 @@ def _name(part: Mapping[str, Any], keys: Sequence[str] = _NAMES) -> str | None:
     return str(name) if isinstance(name, (str, int)) else None
 
 
-def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _told_by(part: Mapping[str, Any], key: str, of: str) -> str | None:
+    """Return the name or number by which an entry tells a part of a list from others; None where it does not.
+
+    The number of a body or a hand is marked: devices give another one whenever they find it.
+    """
+    value, words = part.get(key), words_of(key)
+    is_number = words[-1:] == ("id",) and {*words[:-1]} <= _THINGS | _FOUND
+    is_name = key in _SAID and (key != "type" or str(value).lower() in _LEFT_OR_RIGHT)
+    if not isinstance(value, (str, int)) or not (is_number or is_name):
+        return None
+    found = is_number and ({*words[:-1]} & _FOUND or (key == "id" and {*words_of(of)} & _BODIES))
+    return f"\0id{value}" if found and str(value).isdecimal() else str(value)
+
+
+def _keys_of_parts(samples: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Give for each list of parts the entries that tell these apart in all samples, names before numbers."""
+    keys: dict[str, list[str]] = {}
+
+    def look(sample: Mapping[str, Any], path: str) -> None:
+        for name, value in sample.items():
+            here = f"{path}.{name}"
+            if isinstance(value, Mapping):
+                look(value, here)
+            elif _are_objects(value):
+                keys[here] = [
+                    key
+                    for key in keys.get(here, dict.fromkeys((*_SAID, *value[0])))
+                    if None not in (told := {_told_by(part, key, name) for part in value}) and len(told) == len(value)
+                ]
+                for part in value:
+                    look(part, here)
+
+    for sample in samples:
+        look(sample, "")
+    return keys
+
+
+def _numbered(flat: Sequence[dict[str, Any]], notes: list[str]) -> list[dict[str, Any]]:
+    """Return samples in which bodies are counted from 0, whatever numbers a device gave them.
+
+    A body that is found again has a new number: it takes the first place whose body does not come any more.
+    """
+    spans: dict[str, dict[str, tuple[int, int]]] = {}  # whose -> number -> the first sample with it, and the last
+    for row, cells in enumerate(flat):
+        for name in cells:
+            for match in _GIVEN.finditer(name):
+                ids = spans.setdefault(name[: match.start()], {})
+                ids[match[1]] = ids.get(match[1], (row, row))[0], row
+    places: dict[str, int] = {}
+    for whose, ids in spans.items():
+        held: list[list[str]] = []
+        for number in sorted(ids, key=lambda number: (ids[number][0], int(number))):
+            place = next((place for place in held if ids[place[-1]][1] < ids[number][0]), None)
+            if place is None:
+                held.append(place := [])
+            place.append(number)
+            places[f"{whose}\0id{number}"] = held.index(place)
+        notes += [
+            f"{_GIVEN.sub('', whose)}{k} had the ids {first_names(place, _NAMED)} one after the other, and is read as "
+            "one; look whether it is the same"
+            for k, place in enumerate(held)
+            if len(place) > 1
+        ]
+    named = cache(lambda name: _GIVEN.sub(lambda match: str(places[name[: match.end()]]), name))
+    return [{named(name): cell for name, cell in cells.items()} for cells in flat] if places else [*flat]
+
+
+def _columns(samples: Sequence[Mapping[str, Any]], notes: list[str]) -> dict[str, Any]:
     """Return samples with names as an array for each name, NaN where it is missing; parts by name or number."""
-    flat = [_flat(sample) for sample in samples]
+    keys = _keys_of_parts(samples)
+    flat = [_flat(sample, keys) for sample in samples]
     if any(count > 1 for cells in flat for name, count in cells.items() if name.endswith(_HANDS)):
-        flat = [_flat(sample, by_side=True) for sample in samples]  # they come in another order now and then
+        flat = [_flat(sample, keys, by_side=True) for sample in samples]  # they come in another order now and then
+    flat = _numbered(flat, notes)
     names = dict.fromkeys(name for cells in flat for name in cells)
-    for name in [name for name in names if name.endswith((_COUNT, _HANDS))]:
+    for name in [name for name in names if name.endswith((_COUNT, _HANDS, _SIDE))]:
         del names[name]
+        if name.endswith(_SIDE):
+            if len(sides := {cells[name] for cells in flat if name in cells}) > 1:
+                notes.append(f"one hand is {' and '.join(sorted(sides))} in turns, and read as one; look whether it is")
+            continue
         if len(counts := {cells[name] for cells in flat if name in cells}) > 1:
             raise DataError(
                 f"expected as many {name.rpartition('.')[0]!r} in each sample, since nothing names them, got "
@@ -244,32 +335,38 @@ def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return _columns_of({name: [cells.get(name) for cells in flat] for name in names})
 
 
-def _flat(sample: Mapping[str, Any], by_side: bool = False) -> dict[str, Any]:
+def _flat(
+    sample: Mapping[str, Any], keys: Mapping[str, Sequence[str]], path: str = "", by_side: bool = False
+) -> dict[str, Any]:
     plain: dict[str, Any] = {}
-    sides = next(filter(None, map(_sides, sample.values())), []) if by_side else []
-    for name, value in sample.items():
-        if isinstance(value, list) and value and all(map(_are_objects, value)):  # hands, each of many points
-            if _sides(value):
-                continue
+    told = {name: _sides(name, value) for name, value in sample.items()}
+    sides = next((several for several in told.values() if several and {*map(str.lower, several)} <= _LEFT_OR_RIGHT), [])
+    if not by_side:
+        plain, sides = {_SIDE: sides[0]} if len(sides) == 1 else {}, []
+    for name in [name for name, several in told.items() if not several]:
+        value, here = sample[name], f"{path}.{name}"
+        if isinstance(value, list) and value and all(map(_has_points, value)):  # hands
             if sides and not _NO_HANDS & {*words_of(name)}:
                 if len({*sides}) < len(sides) or len(sides) != len(value):
                     raise DataError(
                         f"expected another side of each of the {len(value)} {name!r} in each sample, got {sides!r:.80}"
                         "; correct that sample, or leave it out"
                     )
-                hands = _flat(dict(zip(sides, value, strict=True)))
+                hands = _flat(dict(zip(sides, value, strict=True)), keys, here)
             else:
-                hands = _flat({str(k): hand for k, hand in enumerate(value)}) | {_HANDS: len(value)}
+                hands = _flat({str(k): hand for k, hand in enumerate(value)}, keys, here) | {_HANDS: len(value)}
             plain |= {f"{name}.{inner}": cell for inner, cell in hands.items()}
         elif isinstance(value, Mapping):
-            plain |= {f"{name}.{inner}": cell for inner, cell in _flat(value, by_side).items()}
+            plain |= {f"{name}.{inner}": cell for inner, cell in _flat(value, keys, here, by_side).items()}
         elif _are_objects(value):
-            parts = [_name(part) for part in value]
+            key = next(iter(keys.get(here, ())), None)
+            parts = [_told_by(part, key, name) if key else _name(part) for part in value]
             if None not in parts and len({*parts}) < len(parts):
                 raise DataError(f"expected parts of {name!r} with different names in each sample, got {parts!r:.80}")
             count = None if len({*parts} - {None}) == len(parts) else len(value)
+            aside = () if count else (*_NAMES, key)
             for k, part in enumerate(value):
-                cells = {inner: cell for inner, cell in _flat(part).items() if count or inner not in _NAMES}
+                cells = {inner: cell for inner, cell in _flat(part, keys, here).items() if inner not in aside}
                 plain |= {f"{name}.{k if count else parts[k]}.{inner}": cell for inner, cell in cells.items()}
             if count:
                 plain[f"{name}.{_COUNT}"] = count
@@ -278,11 +375,28 @@ def _flat(sample: Mapping[str, Any], by_side: bool = False) -> dict[str, Any]:
     return plain
 
 
-def _sides(value: Any) -> list[str]:
-    """Return what MediaPipe holds each hand for; nothing of anything else."""
-    if not isinstance(value, list) or not all(map(_are_objects, value)):
-        return []
-    return [str(hand[0][key]) for hand in value for key in _SIDES if key in hand[0]]
+def _has_points(hand: Any) -> bool:
+    """Tell whether this is a list of points, or holds nothing else, as ``{"landmark": [...]}``."""
+    return _are_objects(hand) or (
+        isinstance(hand, Mapping) and [*hand] == ["landmark"] and _are_objects(*hand.values())
+    )
+
+
+def _sides(name: str, value: Any) -> list[str]:
+    """Return what MediaPipe holds each hand for, a side or a gesture; nothing of anything else."""
+    sides = [_side(hand, "handedness" in words_of(name)) for hand in value] if isinstance(value, list) else []
+    return sides if all(sides) else []
+
+
+def _side(hand: Any, is_bare: bool) -> str:
+    if is_bare and isinstance(hand, str):
+        return hand
+    if isinstance(hand, Mapping) and [*hand] == ["classification"]:
+        hand = hand["classification"]
+    first = hand[0] if _are_objects(hand) else hand if is_bare else None
+    if not isinstance(first, Mapping) or not {*first} <= _BESIDE_SIDE:
+        return ""
+    return next((str(first[key]) for key in _SIDES if key in first), "")
 
 
 def _array(values: list[Any], where: str = "") -> Any:
@@ -298,7 +412,7 @@ def _array(values: list[Any], where: str = "") -> Any:
     if width:
         values = [[np.nan] * width if value is None else value for value in values]
     try:
-        return np.array(values, dtype=np.float64)
+        return np.array(values, dtype=np.bool_ if {*map(type, values)} == {bool} else np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
             f"expected samples of one length{where}, each a list of numbers, got rows that differ in length or "
@@ -342,5 +456,5 @@ def json_messages(path: Path, layout: Layout) -> Parsed:
         if not isinstance(sample, dict):
             raise DataError(f"topic {name}: expected messages that are objects, got {raw[:40]!r}")
         samples.append(sample if any(map(is_time, sample)) else {_RECORDED: recorded / _PER_SECOND} | sample)
-    parsed = tree_movements(as_tree(samples), replace(layout, topic=None), "MCAP", many="take")
+    parsed = _tree_movements(samples, replace(layout, topic=None), "MCAP")
     return parsed._replace(detected=parsed.detected._replace(layout=f"topic {name} in JSON"))

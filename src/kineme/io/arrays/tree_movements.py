@@ -34,13 +34,15 @@ from kineme.io.arrays.trees import (
     movements_in,
 )
 from kineme.io.limits import check_expanded
-from kineme.movements.tables.columns import choose_roles, is_time
+from kineme.io.tables.dialect import is_number
+from kineme.movements.tables.columns import choose_roles, counts_samples, is_time
 from kineme.movements.tables.layout import Layout, Parsed, listed, no_lines
-from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.movements.tables.table import Segments, Table, skipping, table_movements
 from kineme.movements.tables.time_stamps import seconds_of_dates, words_of
 from kineme.movements.trajectories.movements import axis_names
 
 _OF_RATE = "\0rate"  # owner of the times that follow from a rate, which no array is called
+_INSTRUCTIONS = frozenset({"language_instruction", "natural_language_instruction", "instruction"})  # in each step
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
@@ -60,7 +62,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
     # Beside others x may be a label, as of letters, but not where it is the only name.
     unnamed = POSITIONS if len({movement.name for movement in movements}) == 1 else ()
     movements = [
-        movement._replace(label=movement.label or (None if movement.name in unnamed else movement.name))
+        movement._replace(
+            label=movement.label or _instruction(movement) or (None if movement.name in unnamed else movement.name)
+        )
         for movement in movements
     ]
     stamped = any(len(movement.entries) > 1 or movement.rate is not None for movement in movements)
@@ -85,7 +89,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         check_first_axis([movement.entries[""].shape for movement in movements if "" in movement.entries])
         layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
         heads, owners = (*heads, STAMP), (*owners, _OF_RATE)
-    kinds = ["text" if owner != _OF_RATE and is_text(first.entries[owner]) else "number" for owner in owners]
+    kinds = ["number" if owner == _OF_RATE else _kind(first.entries[owner]) for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         shapes = ", ".join(f"{name} ({owners.count(name)})" for name in wide)
@@ -98,13 +102,26 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         return None if entry is None else np.asarray(entry).reshape(first.length, -1)[:, k - owners.index(owners[k])]
 
     roles = choose_roles(heads, kinds, layout, values=values)
-    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
+    counters = [k for k in roles.ignored if roles.time is None and counts_samples(heads[k], heads)]
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks, *counters]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     detected = parsed.detected._replace(ignored=(*parsed.detected.ignored, *static))
     left_out = (*parsed.left_out, *unused)
     return parsed._replace(detected=detected, named_alone=named_alone and roles.label is None, left_out=left_out)
+
+
+def _kind(array: Any) -> str:
+    return "text" if is_text(array) else "flag" if array.dtype.kind == "b" and len(array.shape) == 1 else "number"
+
+
+def _instruction(movement: TreeMovement) -> str | None:
+    """Return what a robot was told, the same in each step, as RLDS has it."""
+    for name, entry in movement.entries.items():
+        if name.rpartition(".")[2] in _INSTRUCTIONS and is_text(entry) and len({*_texts(entry)}) == 1:
+            return _texts(entry)[0] or None
+    return None
 
 
 def _unused_labels(tree: Any, movements: Sequence[TreeMovement]) -> list[str]:
@@ -203,13 +220,22 @@ def _plainly_named(movement: TreeMovement) -> TreeMovement:
 def _with_seconds(movement: TreeMovement) -> TreeMovement:
     """Return times that are texts, if no others are there, as the seconds, which their head then says."""
     times = [name for name in movement.entries if is_time(name)]
-    if len(times) != 1 or not is_text(movement.entries[times[0]]) or not any(_texts(movement.entries[times[0]])):
+    if len(times) != 1 or not is_text(movement.entries[times[0]]):
         return movement
-    seconds, odd = seconds_of_dates(_texts(movement.entries[times[0]]))
-    if odd:
-        raise DataError(f"expected dates or durations in {times[0]!r}, got {next(iter(odd.values()))!r:.80}")
     others = {name: entry for name, entry in movement.entries.items() if name != times[0]}
+    if not any(texts := _texts(movement.entries[times[0]])):  # of nulls alone
+        return movement._replace(entries=others)
+    seconds, odd = seconds_of_dates(texts)
+    if odd:
+        raise no_stamp(times[0], odd)
     return movement._replace(entries={f"{times[0]} (s)": seconds} | others)
+
+
+def no_stamp(head: str, odd: Mapping[int, str]) -> DataError:
+    """Return the error of texts in a column of times."""
+    got = next(iter(odd.values()))
+    quoted = "; write numbers without quotes" if is_number(got, False) else ""
+    return DataError(f"expected dates or durations in {head!r}, got the text {got!r:.80}{quoted}")
 
 
 def _texts(array: Any) -> list[str]:
@@ -276,6 +302,13 @@ def _part(movement: TreeMovement, name: str, length: int, kind: tuple[int, bool,
     width, of_texts, of_time = kind
     if name == _OF_RATE:
         stamps = np.full(length, np.nan) if movement.rate is None else movement.rate.stamps(length)
+        counters = [entry for name, entry in movement.entries.items() if counts_samples(name, movement.entries)]
+        counted = [skipping(entry, np.array([0, length])) for entry in counters if entry.shape == (length,)]
+        if (
+            movement.rate is not None
+            and (frames := next((each for each in counted if each is not None), None)) is not None
+        ):
+            stamps = frames / movement.rate.hertz
         return stamps[:, None], "" if movement.rate else "expected a rate as others have, got none"
     entry = movement.entries.get(name)
     if entry is None:

@@ -41,7 +41,7 @@ _STRUCTURAL = frozenset(
         "test", "valid", "validation", "acquisition", "signal", "signals", "recordings", "table",
         "gestures", "actions", "motions", "strokes", "sequences", "episodes", "trajectories", "items", "results",
         "point", "landmark", "landmarks", "keypoints", "people", "bodies", "templates", "pos", "position", "positions",
-        "xy", "xyz", "coords", "coordinates", "joints",
+        "xy", "xyz", "coords", "coordinates", "joints", "steps",
     }
 )  # fmt: skip
 _DRAWN = frozenset({"points", "point", "strokes"})

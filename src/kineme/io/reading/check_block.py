@@ -120,7 +120,7 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
     samples = f"{n_odd} samples like this" if n_odd > 1 else "this sample"
     effect = f"; {samples} left out" if skip == "sample" else f"; {n_odd - 1} more like this" if n_odd > 1 else ""
     fault = (block.faults or {}).get(row)
-    reason = movement_of(block, i) + (fault or _reason(block, i, k)) + effect
+    reason = movement_of(block, i) + (fault or _reason(block, i, k, skip)) + effect
     left_out = n_odd if skip == "sample" and block.offsets[i + 1] - block.offsets[i] - n_odd >= MIN_SAMPLES else 0
     return Problem(file, block.line_of(row), reason, DataError if fault else TrajectoryError, left_out)
 
@@ -130,7 +130,7 @@ def movement_of(block: Block, i: int) -> str:
     return f"movement {' '.join(block.places[i].splitlines())}: " if block.places[i] else ""
 
 
-def _reason(block: Block, i: int, k: int) -> str:
+def _reason(block: Block, i: int, k: int, skip: str) -> str:
     at = f" at sample {k - block.offsets[i]}"
     if np.isinf(block.positions[k]).any():
         return f"expected finite positions, got {block.positions[k].tolist()}{at}"
@@ -147,10 +147,11 @@ def _reason(block: Block, i: int, k: int) -> str:
     before = times[k - 1]
     if before < times[k]:
         return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"
-    what, remedy = "duplicate", ""
+    skipped = "" if skip == "sample" else " leave such samples out with --skip sample, or,"
+    what, several = "duplicate", f";{skipped} if rows are of several things,"
     if times[k] < before:
-        what = "decreasing"
-        remedy = "; if several movements follow each other, say which column tells them apart, movement=, --movement"
+        what, several = "decreasing", "; if several movements follow each other,"
+    remedy = f"{several} say which column tells them apart, movement=, --movement"
     return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}{remedy}"
 
 

@@ -45,6 +45,7 @@ NAMES = ("people", "person", "subjects", "subject")
 _DEPTH = 3  # person/label/recording
 
 _HINT = "check the order of the columns, or divide the quaternions by their norms"
+_LOST = "nothing was tracked there; leave such samples out with skip='sample', in the shell --skip sample"
 
 
 class Source(NamedTuple):
@@ -161,6 +162,7 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
             f"{first_names(counting, _NAMED)} may count movements that are read as one: the value changes after many "
             "samples, and never back; if so, say movement=, in the shell --movement"
         )
+    notes += dict.fromkeys(note for how, _ in detected for note in how.notes)
     return Recordings(demonstrations, sources, tuple(reported), tuple(detected), tuple(notes))
 
 
@@ -283,7 +285,7 @@ def _check_orientations(file: FileRead, channels: Channels, skip: str) -> tuple[
         owners = np.searchsorted(block.offsets, odd, side="right") - 1
         reasons = [
             f"expected unit quaternions in {', '.join(channel.columns)}, got norm {norms[k]:.6g} at sample "
-            f"{k - block.offsets[i]}; {_HINT}"
+            f"{k - block.offsets[i]}; {_HINT if norms[k] or skip == 'sample' else _LOST}"
             for i, k in zip(owners.tolist(), odd.tolist(), strict=True)
         ]
         faults |= dict(zip((block.row(k) for k in odd.tolist()), reasons, strict=True))

@@ -19,7 +19,7 @@ from kineme.errors import DataError
 from kineme.io.limits import check_expanded
 from kineme.io.records import damaged_as
 from kineme.movements.episodes import STATE
-from kineme.movements.tables.columns import LABEL_WORDS, Roles, choose_roles, excluded_numbers, is_time
+from kineme.movements.tables.columns import LABEL_WORDS, Roles, choose_roles, counts_samples, excluded_numbers, is_time
 from kineme.movements.tables.layout import Layout, no_lines
 from kineme.movements.tables.table import Segments, Table, as_name
 from kineme.movements.tables.time_stamps import nanoseconds, words_of
@@ -136,7 +136,10 @@ def read_parquet_table(data: bytes | Path, layout: Layout, part: range | None = 
         if part is None and (times := [name for name in of_lists if name == layout.time or is_time(name)]):
             return _read_rows_of_movements(file, times[0], of_lists, layout)
         heads, kinds, owners, roles = _columns(file, layout)
-        needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
+        counters = {
+            k for k in roles.ignored if roles.time is None and counts_samples(heads[k]) and kinds[k] == "number"
+        }
+        needed = sorted({owners[k] for k in range(len(heads)) if k in counters or k not in roles.ignored})
         groups = None if part is None else row_groups(data, layout)
         n_rows, size = _extent(file, data, groups, part)
         check_expanded(n_bytes := 8 * n_rows * (len(heads) - len(roles.ignored)))

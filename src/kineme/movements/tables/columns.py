@@ -483,6 +483,7 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
         or _UNNAMED.fullmatch(head)
         or words_of(head)[-2:] == ("time", "fine")  # of Xsens, whose ticks begin anew
         or head in ("next.done", "next.success")  # the end of an episode of LeRobot
+        or (head in ("reward", "discount") and any(name.startswith("observation") for name in plain))  # of a robot
     ):
         return True
     if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states

@@ -151,6 +151,7 @@ class Detected(NamedTuple):
     sentinels: tuple[str, ...] = ()  # numbers that stand for no value, each with its column: "-9999 in x"
     in_blocks: tuple[str, ...] = ()  # columns that may tell movements apart by their values, though none was told so
     converted: tuple[str, ...] = ()  # columns that are in another unit than in the file: "y_m as y [mm]"
+    notes: tuple[str, ...] = ()  # sentences on what may be wrong, though it was read
 
 
 class Repair(NamedTuple):

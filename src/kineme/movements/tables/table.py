@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, no_time
-from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, no_lines
+from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, counts_samples, no_time
+from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
     in_seconds,
@@ -36,6 +36,9 @@ _NUMBERS = (Real, Decimal)
 #: Cell in lower case -> number.
 FLAGS = {"true": 1.0, "false": 0.0, "": np.nan}
 _BLOCKS = 3  # values of a column that may tell movements apart, at least
+_THINGS = frozenset({"sensor", "hand", "marker", "joint"})  # that rows may be of in turns
+_MOST_THINGS = (8, 64)  # in a column that tells them apart by numbers, by texts
+_JUMP = 2.0  # times as far from the row before as from the last row of the same thing
 _WHOLE = re.compile(r"([-+]?\d+)(\.0)?")  # also as pandas writes it beside cells that are empty
 
 
@@ -74,6 +77,8 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     names = {*roles.movement, roles.label}
     columns = [_names(column) if k in names else column for k, column in enumerate(table.columns)]
     table = replace(table, columns=columns)
+    if layout.keys is None:
+        roles = _without_counted(table, roles)
     times, units, units_from = _times(table, roles, layout)
     # Refuse several columns of times that do not show the same clock.
     for k in roles.clocks:
@@ -84,6 +89,12 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
             raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
+    told_by = [table.heads[k] for k in (*roles.movement, roles.label) if k is not None]
+    if told_by and (layout.keys or layout.label) is None and len(codes) >= MIN_SAMPLES > np.bincount(codes).max():
+        raise DataError(
+            f"expected movements of at least {MIN_SAMPLES} samples, got fewer in each, told apart by {listed(told_by)}"
+            "; if it tells none apart, leave it aside with exclude=, in the shell --exclude"
+        )
     people: list[str | None] | None = None
     if roles.person is not None:  # who showed the first sample of each movement
         shown = table.columns[roles.person][np.unique(codes, return_index=True)[1]]
@@ -93,7 +104,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         positions, times, codes = positions[rows], times[rows], codes[rows]
     offsets = np.searchsorted(codes, np.arange(n + 1))
     if roles.time is None:
-        times = (np.arange(len(times)) - np.repeat(offsets[:-1], np.diff(offsets))) * float(units)
+        times = _samples_so_far(table, roles, offsets, rows) * float(units)
     heads = table.heads
     detected = Detected(
         f"{table.maker} {kind}".strip(),
@@ -108,9 +119,26 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
         in_blocks=_in_blocks(table, roles, codes, rows),
+        notes=_note_on_turns(table, roles, positions, codes, rows),
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+
+
+def _without_counted(table: Table, roles: Roles) -> Roles:
+    """Leave a column aside that is named as one of movements, and counts samples: its value is new in each."""
+    for k in roles.movement:
+        values = table.columns[k]
+        alone = words_of(table.heads[k]) == ("id",) or len(roles.movement) == 1
+        if k == roles.person or not alone or len(values) < 2 or (values[1:] == values[:-1]).any():
+            continue
+        told_by = [table.columns[i].tolist() for i in (*roles.movement, roles.label) if i is not None]
+        lengths = [len(values)] if table.segments is None else np.diff(table.segments.offsets)
+        told_by.append(np.repeat(np.arange(len(lengths)), lengths).tolist())
+        if len({*zip(*told_by, strict=True)}) == len(values):
+            movement = tuple(i for i in roles.movement if i != k)
+            return roles._replace(movement=movement, ignored=(*roles.ignored, k))
+    return roles
 
 
 def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArray[np.intp] | None) -> tuple[str, ...]:
@@ -137,6 +165,84 @@ def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArra
         if counts:
             heads.append(table.heads[k])
     return tuple(heads)
+
+
+def _samples_so_far(
+    table: Table, roles: Roles, offsets: NDArray[np.intp], rows: NDArray[np.intp] | None
+) -> NDArray[np.float64]:
+    """Count the samples before each one of its movement, with those that a counter of samples skips."""
+    for k in roles.ignored:
+        if counts_samples(table.heads[k], table.heads) and (values := table.columns[k]) is not None:
+            counted = skipping(values if rows is None else values[rows], offsets)
+            if counted is not None:
+                return counted
+    return np.arange(float(offsets[-1])) - np.repeat(offsets[:-1], np.diff(offsets))
+
+
+def skipping(counter: Any, offsets: NDArray[np.intp]) -> NDArray[np.float64] | None:
+    """Count the samples since each movement began, by a counter that goes on by 1 but for some that it skips; or None.
+
+    One that goes on by 2 says nothing of the time between two samples, and one that goes back is none.
+    """
+    try:
+        numbers = np.asarray(counter, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    inner = np.ones(max(len(numbers) - 1, 0), dtype=bool)
+    inner[offsets[1:-1] - 1] = False
+    steps = np.diff(numbers)[inner]
+    if not len(steps) or not (steps >= 1).all() or np.median(steps) != 1 or steps.max() == 1:
+        return None
+    if not np.all(steps == np.rint(steps)):
+        return None
+    return numbers - np.repeat(numbers[offsets[:-1]], np.diff(offsets))
+
+
+def _note_on_turns(
+    table: Table, roles: Roles, positions: Array, codes: NDArray[np.intp], rows: NDArray[np.intp] | None
+) -> tuple[str, ...]:
+    """Say which column tells rows of several things apart, in turns, that are read as one movement."""
+    for k in (*roles.ignored, *roles.positions):
+        values = table.columns[k]
+        if values is None or DISCRETE_WORDS & {*words_of(table.heads[k])}:
+            continue
+        others = positions[:, [i for i, place in enumerate(roles.positions) if place != k]]
+        if _are_in_turns(table.heads[k], values if rows is None else values[rows], others, codes):
+            return (
+                f"rows of several things may be mixed in one movement, which {table.heads[k]} names in turns; if so, "
+                "say movement=, in the shell --movement",
+            )
+    return ()
+
+
+def _are_in_turns(head: str, values: NDArray[Any], x: Array, codes: NDArray[np.intp]) -> bool:
+    """Tell whether values name things of which rows are in turns: each goes on where it was, not where others are.
+
+    `x` are the other coordinates (T, d), `codes` the movements. Texts or whole numbers, few, that come back.
+    """
+    changed = np.flatnonzero((values[1:] != values[:-1]) & (codes[1:] == codes[:-1])) + 1
+    are_texts = values.dtype.kind == "O"
+    if len(changed) < MIN_SAMPLES or not (are_texts or np.all(values == np.rint(values))):
+        return False
+    several = {*values.tolist()}
+    if len(several) > _MOST_THINGS[are_texts]:
+        return False
+    if _THINGS & {*words_of(head)} and 2 * len(changed) >= len(values):
+        return True
+    number_of = {value: number for number, value in enumerate(several)}
+    things = np.array([number_of[value] for value in values.tolist()]) + len(several) * codes
+    order = np.argsort(things, kind="stable")
+    before = np.full(len(values), -1)
+    before[order[1:]] = np.where(np.diff(things[order]) == 0, order[:-1], -1)
+    back = changed[before[changed] >= 0]
+    if len(back) < MIN_SAMPLES or not x.shape[1]:
+        return False
+    extent = np.fmax.reduce(x) - np.fmin.reduce(x)
+    far, near = (
+        float(np.median(np.nansum(np.abs(x[back] - x[rows]) / np.where(extent > 0, extent, 1.0), axis=1)))
+        for rows in (back - 1, before[back])
+    )
+    return far > _JUMP * near
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:

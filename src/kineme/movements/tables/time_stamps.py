@@ -48,6 +48,7 @@ _DURATIONS = (
     re.compile(rf"((?P<d>-?\d+) days? ?\+?)?{_CLOCK}"),
     re.compile(r"P(?P<d>-?\d+)DT(?P<h>\d+)H(?P<m>\d+)M(?P<s>\d+([.,]\d+)?)S"),
     re.compile(r"(?P<d>-?\d+) days?"),
+    re.compile(r"(?P<m>\d{1,3}):(?P<s>[0-5]\d[.,]\d+)"),  # without a fraction these may be hours
 )
 #: A time of day in halves, alone or after a date that begins with the year: 10:15:03.250 PM.
 _HALF_DAYS = re.compile(
