@@ -195,7 +195,7 @@ def test_heads_that_are_not(head):
     ],
 )
 def test_columns_find_their_roles(heads, roles):
-    assert choose_roles(heads.split(), ["number"] * len(heads.split()), Layout()) == (*roles, None, None, ())
+    assert choose_roles(heads.split(), ["number"] * len(heads.split()), Layout()) == (*roles, None, None, (), ())
 
 
 def test_roles_that_are_given_win():

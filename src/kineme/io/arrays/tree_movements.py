@@ -98,7 +98,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
         return None if entry is None else np.asarray(entry).reshape(first.length, -1)[:, k - owners.index(owners[k])]
 
     roles = choose_roles(heads, kinds, layout, values=values)
-    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks, *roles.apart]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)

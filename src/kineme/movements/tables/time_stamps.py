@@ -36,6 +36,8 @@ _TICK_WORDS = frozenset({"tick", "ticks"})
 _SLOW_IN_US = 2e5  # five samples a second, or fifty if they are ticks of 100 ns, as a camera with depth writes them
 _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
+_RATE, _STEPS_APART = 1e-3, 3  # of the time that passed, and steps, by which clocks of one rate differ in the end
+_RUNNING = 0.9  # of the steps of a clock, at least, go forward
 
 _DATE = re.compile(r"\d{4}([-/])\d\d\1\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
 _CLOCK = r"(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d([.,]\d+)?)"
@@ -120,6 +122,19 @@ def same_clock(times: Array, others: Array) -> bool:
     a, b = (each[both] - each[both][:1] for each in (times, others))
     step = float(np.median(np.abs(np.diff(a)))) if len(a) > 1 else 0.0
     return bool((np.abs(a - b) <= 0.5 * step + _DRIFT * np.abs(a)).all())
+
+
+def same_rate(times: Array, others: Array) -> bool:
+    """Tell whether two columns of times [s] (total,) run alike but for a few steps; true of one that often stands.
+
+    Steps back, as where another movement begins, and missing stamps do not count.
+    """
+    both = np.isfinite(times) & np.isfinite(others)
+    a, b = (np.diff(each[both]) for each in (times, others))
+    if not len(b) or np.mean(b > 0) < _RUNNING:
+        return True
+    on = (a >= 0) & (b >= 0)
+    return bool(abs(np.sum(a[on] - b[on])) <= (_STEPS_APART / max(1, np.count_nonzero(on)) + _RATE) * np.sum(a[on]))
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
