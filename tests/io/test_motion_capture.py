@@ -1,5 +1,7 @@
 """Text exports of motion capture systems, in the layouts that their makers document; BVH; C3D written by ezc3d."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -159,6 +161,13 @@ def test_motive_rigid_bodies_are_poses_and_what_follows_from_them_is_left_aside(
     np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) / 120, atol=1e-6)
     markers = read(motive(rigid=False)).demonstrations
     assert markers.dimensions == ("Marker1.x", "Marker1.y", "Marker1.z")
+
+
+def test_motive_without_a_column_of_times_keeps_its_first_coordinate():
+    timed = motive(rigid=False)
+    bare = "\n".join(re.sub(r"^(Frame|\d*),[^,]*,(?!1.23)", r"\1,", line) for line in timed.splitlines())
+    assert "\nFrame,X,Y,Z\n" in bare
+    np.testing.assert_allclose(read(bare).demonstrations.recorded, read(timed).demonstrations.recorded)
 
 
 def test_qualisys_times_come_from_the_frequency_or_from_their_column():

@@ -154,12 +154,12 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     n = len(rows[at])
     kinds, names, contents = ((row + [""] * n)[:n] for row in (above[0], above[1], above[-1]))
     solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)
-    plain = without_common_subject(names[2:])
     quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
     timed = n > 1 and rows[at][1].lower().startswith("time")
-    heads, units = ["frame", STAMP if timed else ""], ["", "s"]
-    axes = [cell.lower() for cell in rows[at][2:]]
-    for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], axes, strict=True):
+    heads, units = ["frame", *[STAMP] * timed], ["", *["s"] * timed]
+    before = len(heads)
+    plain, axes = without_common_subject(names[before:]), [cell.lower() for cell in rows[at][before:]]
+    for kind, name, content, axis in zip(kinds[before:], plain, contents[before:], axes, strict=True):
         what = content.lower()
         left_out = (solved and kind.lower() in _EXPECTED) or axis not in "xyzw" or not axis
         if left_out or what not in ("position", "rotation"):
