@@ -170,6 +170,14 @@ def test_motive_without_a_column_of_times_keeps_its_first_coordinate():
     np.testing.assert_allclose(read(bare).demonstrations.recorded, read(timed).demonstrations.recorded)
 
 
+@pytest.mark.parametrize(("order", "name"), [("XYZ", "rotation"), ("ZYX", "rotation_zyx"), ("Euler", "rotation")])
+def test_motive_angles_in_an_order_of_their_own_are_named_by_it(order, name):
+    text = motive().replace("Type,Quaternion", f"Type,{order}").replace("X,Y,Z,W,X,Y,Z", "X,Y,Z,,X,Y,Z")
+    channels = read(text).demonstrations.channels
+    assert recorded_names(channels)[:3] == tuple(f"Cup.{name}.{axis}" for axis in "xyz")
+    assert [(channel.kind, channel.unit) for channel in channels][:3] == [("angle", "deg")] * 3
+
+
 def test_qualisys_times_come_from_the_frequency_or_from_their_column():
     for headed in (False, True):
         recordings = read(qualisys(headed), "a.tsv")

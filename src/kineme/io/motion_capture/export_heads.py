@@ -13,6 +13,7 @@ _SECTIONS = ("trajectories", "segments", "objects", "joints", "model outputs", "
 _OTHERS = ("events",)
 _QUATERNION = ("rx", "ry", "rz", "rw")
 
+_EULER = re.compile(r"\b[xyz]{3}\b")
 _FIRST = "PathFileType"
 
 _POSES = ("x", "y", "z", "roll", "pitch", "yaw", "residual", *(f"rot[{k}]" for k in range(9)))
@@ -154,7 +155,10 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     n = len(rows[at])
     kinds, names, contents = ((row + [""] * n)[:n] for row in (above[0], above[1], above[-1]))
     solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)
-    quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
+    rotations = said.get("rotation type", "quaternion").lower()
+    quaternions, order = "quaternion" in rotations, _EULER.search(rotations)
+    # Of three angles the order is in the name where it is not that of most exports: others are other angles.
+    turning = "orientation" if quaternions else f"rotation_{order[0]}" if order and order[0] != "xyz" else "rotation"
     timed = n > 1 and rows[at][1].lower().startswith("time")
     heads, units = ["frame", *[STAMP] * timed], ["", *["s"] * timed]
     before = len(heads)
@@ -167,7 +171,7 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
         elif what == "position":
             heads.append(f"{name}.position.{axis}" if solved else f"{name}.{axis}")
         else:
-            heads.append(f"{name}.{'orientation' if quaternions else 'rotation'}.{axis}")
+            heads.append(f"{name}.{turning}.{axis}")
         units.append(
             "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
         )
