@@ -271,6 +271,13 @@ def test_a_row_of_units_below_the_heads_is_not_a_sample(units):
     assert how.units_from == ("head" if "ms" in units else "by its steps")
 
 
+@pytest.mark.parametrize("unit", ["m/(s^2)", "no_units", "local_flux", "kOhms", "%MVC", "µV", "uT", "dps"])
+def test_a_row_of_units_may_hold_some_that_nobody_knows(unit):
+    rows = "".join(f"{10 * k},{k},{k * k}\n" for k in range(N))
+    how = read(f"time,x,y\nms,{unit},{unit}\n{rows}").detected[0][0]
+    assert (how.units, how.columns, how.measured_in) == ("ms", ("x", "y"), (unit, unit))
+
+
 def test_names_and_gaps_below_the_heads_are_not_units():
     rows = "".join(f"w,{k / 10},{k},{k * k}\n" for k in range(N))
     cropped = read(f"label,time,x,y\nw,-1,,\n{rows}")

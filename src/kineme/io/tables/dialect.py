@@ -32,6 +32,7 @@ _NUMBER = re.compile(rf"{_DIGITS}|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _MEASURED = re.compile(rf"{_DIGITS}\s*(?P<unit>[^\s\d.,].*)")  # a number with its unit beside it: 12.3 mm
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d)")  # before an exponent, of double precision
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
+_BRACKETED = re.compile(r"^[\[(]\s*(.*?)\s*[\])]$")  # a unit; the brackets of m/(s^2) are its own
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 _SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
@@ -142,7 +143,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     numbers = [str(k) for k in range(len(cells[0]))]  # above fractions, as data frames without heads are written
     numbered = not named and cells[0] == numbers and any("." in cell for cell in cells[-1])
     first += numbered
-    units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
+    units = _units_below(cells[0], cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
     if units:
         units, first = (*units, *[""] * (len(cells[0]) - len(units))), rows[1] + 1
     body = cells[named + bool(units) or numbered :]
@@ -162,7 +163,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     }
     kinds = tuple("flag" if k in flags else kind for k, kind in enumerate(kinds))
     if heads:
-        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, tuple(map(text_in, units)))
     names = tuple(f"column {k}" for k in range(len(kinds)))
     return Dialect(separator, comma, names, False, first, kinds)
 
@@ -185,13 +186,19 @@ def _joined(rows: Sequence[list[str]]) -> list[str]:
     return ["frame" if first == "coords" else first, *heads]
 
 
-def units_in(cells: Sequence[str]) -> tuple[str, ...]:
-    """Return the units in a row that holds nothing but units, without brackets; empty if it is no such row."""
-    plain = tuple(cell.strip("[]() ") for cell in cells)
+def _units_below(heads: Sequence[str], cells: Sequence[str]) -> tuple[str, ...]:
+    """Return the units in a row below heads that all differ, also beside words that are no units to us: ``%MVC``."""
+    words = len({*heads}) == len(heads) and not any(is_number(cell, True) or is_date(cell) for cell in cells)
+    return units_in(cells, words)
+
+
+def units_in(cells: Sequence[str], words: bool = False) -> tuple[str, ...]:
+    """Return the units in a row that holds nothing but units, without brackets, or `words` beside them; else nothing."""
+    plain = tuple(_BRACKETED.sub(r"\1", cell.strip()) for cell in cells)
     letters = [cell.lower() in _LETTERS for cell in plain]
     n_units = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
     others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
-    return plain if n_units and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+    return plain if n_units and (words or not others) and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 
 def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[str]]) -> list[int]:
