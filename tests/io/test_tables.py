@@ -490,6 +490,21 @@ def test_several_lines_of_heads_are_one(tmp_path, names):
     np.testing.assert_array_equal(demos[0].positions, frame.to_numpy()[:, [0, 1, 3, 4]])
 
 
+@pytest.mark.parametrize(
+    ("heads", "names", "unit"),
+    [
+        ("Time,Hand,,,\n,x,y,z,", ["Hand.x", "Hand.y", "Hand.z"], None),
+        ("Time,Hand,Hand,Hand,\n,x,y,z,\ns,m,m,m,", ["Hand.x", "Hand.y", "Hand.z"], "m"),
+        (",Hand,,,\nTime,x,y,z,\ns,mm,mm,mm,", ["Hand.x", "Hand.y", "Hand.z"], "mm"),
+        ("Time,left,,right,\n,Hand,,,\n,x,y,z,", ["left.Hand.x", "left.Hand.y", "right.z"], None),
+    ],
+)
+def test_a_head_stands_also_above_the_empty_cells_to_its_right(heads, names, unit):
+    recordings = read("\n".join([heads, *(f"{k / 10},{k},{k * k},{k % 3}," for k in range(8))]))
+    assert recordings.detected[0][0].columns == tuple(names)
+    assert recordings.detected[0][0].measured_in == ((unit,) * 3 if unit else ())
+
+
 def test_times_that_are_not_understood_are_shown():
     for stamp in ("01/05/2024 10:00:0{}", "5/1/2024 11:59:5{} PM", "10:00:01:00{}"):
         with pytest.raises(

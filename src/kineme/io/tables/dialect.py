@@ -170,17 +170,33 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
     """Count the lines of heads: several where a name in the first stands above several columns, as of points."""
-    top = [cell for cell in cells[0] if cell]
-    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) for cell in row)), 1)
-    alike = len({len(row) for row in cells[:lines]}) == 1 and len({*top}) < len(top)
-    return lines if 1 < lines <= _MOST_HEADS and alike and not any(map(units_in, cells[1:lines])) else 1
+    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) or is_date(cell) for cell in row)), 1)
+    lines -= lines > 1 and bool(units_in(cells[lines - 1]))
+    if not 1 < lines <= _MOST_HEADS or len({len(row) for row in cells[:lines]}) > 1:
+        return 1
+    top = [cell for cell in _filled(cells[:lines])[0] if cell]
+    return lines if len({*top}) < len(top) and not any(map(units_in, cells[1:lines])) else 1
+
+
+def _filled(rows: Sequence[list[str]]) -> list[list[str]]:
+    """Return lines of heads with a name also above the columns to the right that it stands for, whose cells are empty.
+
+    It ends where one above it does, and stands for no column without a name below; the first column is none of them.
+    """
+    filled = [list(row) for row in rows]
+    for i, row in enumerate(filled[:-1]):
+        for k in range(2, len(row)):
+            goes_on = i == 0 or filled[i - 1][k] == filled[i - 1][k - 1]
+            if not row[k] and goes_on and any(below[k] for below in rows[i + 1 :]):
+                row[k] = row[k - 1]
+    return filled
 
 
 def _joined(rows: Sequence[list[str]]) -> list[str]:
     """Return lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
     if len(rows) == 1:
         return rows[0]
-    names = [row[1:] for row in rows if row[0] != "scorer"]
+    names = [row[1:] for row in _filled(rows) if row[0] != "scorer"]
     first = next((row[0] for row in reversed(rows) if row[0]), "")
     heads = (".".join(filter(None, cells)) for cells in zip(*names, strict=True))
     return ["frame" if first == "coords" else first, *heads]
@@ -193,7 +209,7 @@ def _units_below(heads: Sequence[str], cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def units_in(cells: Sequence[str], words: bool = False) -> tuple[str, ...]:
-    """Return the units in a row that holds nothing but units, without brackets, or `words` beside them; else nothing."""
+    """Return the units in a row of nothing but units, without brackets, or of `words` beside them; else nothing."""
     plain = tuple(_BRACKETED.sub(r"\1", cell.strip()) for cell in cells)
     letters = [cell.lower() in _LETTERS for cell in plain]
     n_units = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
