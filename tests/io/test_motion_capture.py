@@ -205,6 +205,14 @@ def test_zeros_and_nothing_in_place_of_a_marker_of_trc_are_a_gap(zeros):
     np.testing.assert_allclose(recordings.demonstrations.positions, expected, atol=0.5)
 
 
+@pytest.mark.parametrize("export", [vicon, motive])
+def test_exports_that_a_european_program_for_tables_has_saved(export):
+    text = re.sub(r"(?<=\d)\.(?=\d)", "@", export()).replace(",", ";").replace("@", ",")
+    saved = text.replace("\r", "").strip().replace("\n\n", "\n;;;\n")
+    np.testing.assert_array_equal(read(saved).demonstrations.recorded, read(export()).demonstrations.recorded)
+    assert read(saved).detected[0][0] == read(export()).detected[0][0]
+
+
 def test_qualisys_bodies_are_positions_and_angles():
     recordings = read(qualisys_bodies(), "a.tsv")
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]

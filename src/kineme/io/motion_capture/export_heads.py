@@ -15,6 +15,7 @@ _QUATERNION = ("rx", "ry", "rz", "rw")
 
 _EULER = re.compile(r"\b[xyz]{3}\b")
 _FIRST = "PathFileType"
+_EMPTY = " \t\r\n,;"  # what a line without values consists of
 
 _POSES = ("x", "y", "z", "roll", "pitch", "yaw", "residual", *(f"rot[{k}]" for k in range(9)))
 
@@ -140,11 +141,12 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     ``Format Version,1.23,...,Length Units,Meters``. After an empty line there are rows with the type, the name, the id
     and more of each column, then one with what it holds, and the row of heads ``Frame,Time (Seconds),X``.
     """
-    cells = cells_of(lines[0], ",") if lines else []
-    if not cells or cells[0].lower() != "format version":
+    marks = (mark for mark in ",;\t" if lines and cells_of(lines[0], mark)[0].lower() == "format version")
+    if (separator := next(marks, None)) is None:
         return None
+    cells = cells_of(lines[0], separator)
     said = dict(zip((cell.lower() for cell in cells[::2]), cells[1::2], strict=False))
-    rows = [cells_of(line, ",") for line in lines]
+    rows = [cells_of(line, separator) for line in lines]
     at = next((k for k, row in enumerate(rows) if [cell.lower() for cell in row[:1]] == ["frame"]), None)
     if at is None:
         raise DataError("expected an OptiTrack export with a row of heads 'Frame, Time (Seconds), X, ...', got none")
@@ -176,7 +178,7 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
             "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
         )
     rate = positive(said.get("export frame rate") or said.get("capture frame rate") or "")
-    return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
+    return ExportHead("OptiTrack", separator, tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
 
 
 def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
@@ -268,7 +270,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     with ``subject:marker`` above the first column of each, the row of heads ``Frame,Sub Frame,X,Y,Z,...``, a row of
     units, and the samples up to an empty line.
     """
-    first = next((k for k, line in enumerate(lines) if line.strip(" \t\r\n,")), None)
+    first = next((k for k, line in enumerate(lines) if line.strip(_EMPTY)), None)
     if first is None or _name(lines[first]) not in (*_SECTIONS, *_OTHERS):
         return None
     starts = {_name(line): k for k, line in reversed(list(enumerate(lines))) if _name(line) in _SECTIONS}
@@ -278,8 +280,8 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     at = starts[section]
     if len(lines) < at + 5:
         raise DataError(f"expected samples below the section {section!r} of a Vicon export, got its head alone")
-    separator = "\t" if "\t" in lines[at + 3] else ","
-    rate = positive(lines[at + 1].strip(" \t\r\n,"))
+    separator = next((mark for mark in "\t;" if mark in lines[at + 3]), ",")
+    rate = positive(lines[at + 1].strip(_EMPTY))
     names, heads, units = (cells_of(line, separator) for line in lines[at + 2 : at + 5])
     if rate is None or not heads or heads[0].lower() != "frame":
         raise DataError(f"expected a rate, names and the heads 'Frame, Sub Frame, ...' below the section {section!r}")
@@ -292,7 +294,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     columns = [_head(section, *column) for column in zip(plain, heads[:n], turned, strict=True)]
     columns[0] = "frame"
     columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
-    end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(" \t\r\n,")), None)
+    end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(_EMPTY)), None)
     measured_in = tuple(
         "" if quaternion else unit for unit, quaternion in zip((units + [""] * n)[:n], turned, strict=True)
     )
@@ -300,7 +302,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
 
 
 def _name(line: str) -> str:
-    return line.strip(" \t\r\n,\ufeff").lower()
+    return line.strip(f"{_EMPTY}\ufeff").lower()
 
 
 def _head(section: str, name: str, head: str, quaternion: bool) -> str:
