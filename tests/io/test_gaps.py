@@ -257,6 +257,17 @@ def test_gaps_of_arrays_and_tables_are_filled_alike(tmp_path, suffix):
     assert recordings.sources[0].filled == 5
 
 
+def test_gaps_of_movements_without_stamps_are_filled_by_their_share_of_the_movement():
+    x = np.sin(np.arange(101) / 20)
+    text = ",".join("?" if 30 <= k < 34 else f"{value:.6f}" for k, value in enumerate(x))
+    series = f"@timeStamps false\n@missing true\n@classLabel true a\n@data\n{text}:a\n"
+    recordings = read_recordings_from_bytes(series.encode(), "a.ts", Layout())
+    np.testing.assert_allclose(recordings.demonstrations.positions[:, 0], x, atol=1e-3)
+    assert (recordings.sources[0].filled, recordings.sources[0].longest_gap) == (4, pytest.approx(0.05))
+    with pytest.raises(DataError, match=r"for up to 0.05 s; say --fill-gaps 0.05 or"):
+        read_recordings_from_bytes(series.encode(), "a.ts", Layout(fill_gaps=0.04))
+
+
 def test_a_library_takes_its_columns_from_recordings_with_more(tmp_path):
     t = np.arange(120) / 60
     rng = np.random.default_rng(0)

@@ -58,7 +58,9 @@ def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str])
             problems.append(_problem(block, file, i, first, (int(n_odd[i]), skip)))
         block = _keep(block, ~odd) if skip == "sample" else take_movements(block, n_odd == 0)
     if np.isnan(block.positions).any():
-        block, lacking = _without_missing(fill_gaps(block, columns, layout), file, skip, columns)
+        filled = fill_gaps(replace(block, times=block.stamps), columns, layout)
+        timed, (block, lacking) = block.times is not None, _without_missing(filled, file, skip, columns)
+        block = block if timed else replace(block, times=None)
         problems += lacking
     lengths = np.diff(block.offsets)
     for i in np.flatnonzero(lengths < MIN_SAMPLES).tolist():
