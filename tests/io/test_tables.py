@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -339,10 +340,13 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
         (
             (0, 1, 2, 1.5, 1.7, 3),
             "got decreasing stamps 2 and 1.5 s at sample 3; if several movements .*, --movement",
-            [0, 1, 2, 3],
+            [0, 1, 1.5, 1.7, 3],
         ),
+        ((0, 1, 1000, 2, 3, 4), "got decreasing stamps 1000 and 2 s at sample 3", [0, 1, 2, 3, 4]),
+        ((0, 1000, 1001, 2, 3, 4), "got decreasing stamps 1001 and 2 s at sample 3", [0, 2, 3, 4]),
         ((0, 1, "inf", 3, 4, 5), "expected finite times, got inf at sample 2", [0, 1, 3, 4, 5]),
-        ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", None),
+        ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", [0, 1, 2, 3, 6]),
+        ((5, 4, 3, 2, 1, 6), "got decreasing stamps 5 and 4 s at sample 1", None),
     ],
 )
 def test_time_must_go_on(times, reason, remaining):
@@ -353,7 +357,9 @@ def test_time_must_go_on(times, reason, remaining):
         with pytest.raises(kineme.errors.DataError, match="expected at least 4 samples, got 2"):
             read(text, skip="sample")
     else:
-        assert read(text, skip="sample").demonstrations.times.tolist() == remaining
+        recordings = read(text, skip="sample")
+        assert recordings.demonstrations.times.tolist() == remaining
+        assert re.search(reason, recordings.problems[0].reason)
 
 
 @pytest.mark.parametrize("text", ["time,x,y,\n" + "".join(f"{k},1,{k},\n" for k in range(5))])

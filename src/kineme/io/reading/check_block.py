@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -95,7 +96,7 @@ def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str])
 
 
 def _unusable(block: Block, skip: str) -> Flags:
-    """Mark samples out of range, or not later than the sample before; if samples are dropped, than all kept before."""
+    """Mark samples out of range, or not later than the sample before; if samples are dropped, the fewest of these."""
     total = len(block.positions)
     odd: Flags = np.asarray((np.abs(block.positions) > LARGEST_POSITION).any(axis=1))  # what is missing comes later
     if block.faults:
@@ -107,14 +108,26 @@ def _unusable(block: Block, skip: str) -> Flags:
     step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
     late = ~(step >= SHORTEST_STEP)
     if skip == "sample" and (odd | late).any():
-        # Samples not later than all usable ones before them, in the movements that have a fault.
         for i in np.unique(np.searchsorted(block.offsets, np.flatnonzero(odd | late), side="right") - 1):
             rows = slice(block.offsets[i], block.offsets[i + 1])
-            usable = np.where(odd[rows], -np.inf, block.times[rows])
-            before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
-            with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
-                late[rows] = ~(usable - before >= SHORTEST_STEP)
+            late[rows] = ~_increasing(block.times[rows], ~odd[rows])
     return odd | late
+
+
+def _increasing(times: Array, usable: Flags) -> Flags:
+    """Mark as many usable stamps as increase one after the other, the earlier one of two that are equal."""
+    ends, last, before = list[float](), list[int](), np.full(len(times), -1)  # per length the run that ends earliest
+    for k in np.flatnonzero(usable).tolist():
+        t = float(times[k])
+        n = bisect_left(ends, True, key=lambda end, t=t: not t - end >= SHORTEST_STEP)
+        before[k] = last[n - 1] if n else -1
+        if n == len(ends) or t < ends[n]:
+            ends[n : n + 1], last[n : n + 1] = [t], [k]
+    marked: Flags = np.zeros(len(times), dtype=bool)
+    k = last[-1] if last else -1
+    while k >= 0:
+        marked[k], k = True, int(before[k])
+    return marked
 
 
 def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> Problem:
@@ -146,6 +159,10 @@ def _reason(block: Block, i: int, k: int) -> str:
         return f"expected finite times, got {times[k]}{at}"
     if abs(times[k]) > LARGEST_STAMP:
         return f"expected times up to {LARGEST_STAMP:g} s, got {times[k]:.9g}{at}"
+    first, end = block.offsets[i], block.offsets[i + 1]
+    if k == first or times[k] - times[k - 1] >= SHORTEST_STEP:  # this one is too late: the next ones are before it
+        k += 1 + int(np.argmax(times[k + 1 : end] - times[k] < SHORTEST_STEP))
+        at = f" at sample {k - first}"
     before = times[k - 1]
     if before < times[k]:
         return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"
