@@ -175,6 +175,13 @@ def test_a_second_clock_is_excluded():
     assert read(data, exclude="timestamp [s]").demonstrations.dimensions == ("x",)
 
 
+def test_numbers_of_columns_that_are_excluded_count_once_over_all_of_the_file():
+    t = np.arange(50) / 50
+    data = table(t, np.column_stack([t, t**2, t**3]), ("x", "y", "z"))
+    assert read(data, exclude=1).demonstrations.dimensions == ("y", "z")
+    assert read(data, exclude="1").demonstrations.dimensions == ("y", "z")
+
+
 def test_the_shell_takes_names_with_commas_in_quotes(tmp_path):
     t = np.arange(50) / 50
     heads = ("x", '"Joint, 2"', "y")

@@ -204,6 +204,8 @@ class Parsed(NamedTuple):
     left_out: tuple[str, ...] = ()
     # Whether its label is no more than the name of its one array or group: a folder says better what it is.
     named_alone: bool = False
+    # Whether the columns that are excluded by their numbers in the file are left out already.
+    without_excluded: bool = False
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:

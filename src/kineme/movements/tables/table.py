@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, no_time
+from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, excluded_numbers, no_time
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
@@ -122,7 +122,9 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         in_blocks=_in_blocks(table, roles, codes, rows),
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
-    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+    block = Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people)
+    excluded = excluded_numbers(heads, layout.excluded)
+    return Parsed(detected, block, without_excluded=bool(excluded) and excluded.isdisjoint(roles.positions))
 
 
 def _in_blocks(table: Table, roles: Roles, codes: NDArray[np.intp], rows: NDArray[np.intp] | None) -> tuple[str, ...]:
