@@ -532,6 +532,25 @@ def test_lines_above_the_heads_are_passed_over(mark):
             read(f"{above}\n{rows}")
 
 
+def test_a_first_column_without_a_head_that_does_not_increase_is_no_time():
+    x = np.sin(np.arange(20))
+    oscillates = [(a, k / 7, k) for k, a in enumerate(x)]
+    with pytest.raises(kineme.errors.DataError, match=r"numbers that do not increase; say which has them .* --units"):
+        read(lines(oscillates, "").strip())
+    for choice, columns in ({}, ["column 0", "column 1", "column 2"]), ({"columns": [1, 2]}, ["column 1", "column 2"]):
+        recordings = read(lines(oscillates, "").strip(), units=0.5, **choice)
+        assert recordings.detected[0][0].columns == tuple(columns)
+        np.testing.assert_array_equal(recordings.demonstrations.times, np.arange(20) / 2)
+    increases = [(k / 7, a, k) for k, a in enumerate(x)]
+    with pytest.raises(kineme.errors.DataError, match="say time=0 if they are times, else columns= with 0 among them"):
+        read(lines(increases, "").strip(), units=0.5)
+    for choice, n_dims, end in ({"time": 0}, 2, 19 / 14), ({"columns": [0, 1, 2]}, 3, 9.5), ({"exclude": 0}, 2, 9.5):
+        demos = read(lines(increases, "").strip(), units=0.5, **choice).demonstrations
+        assert (demos.n_dims, demos.times[-1]) == (n_dims, pytest.approx(end))
+    counted = read(lines([(k, a) for k, a in enumerate(x)], "").strip(), units=0.5).demonstrations  # as frames
+    assert (counted.n_dims, counted.times[-1]) == (1, 9.5)
+
+
 def test_a_line_that_numbers_the_columns_is_no_sample():
     rows = [(k / 10, 1.5 * k, k) for k in range(5)]
     np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)
