@@ -213,6 +213,20 @@ def test_exports_that_a_european_program_for_tables_has_saved(export):
     assert read(saved).detected[0][0] == read(export()).detected[0][0]
 
 
+def test_the_first_two_rows_of_an_empatica_are_its_start_and_its_rate():
+    rows = [(k, k * k, 5) for k in range(N)]
+    for n, names in (3, ("x", "y", "z")), (1, ("x",)):
+        text = "\n".join(", ".join([cell] * n) for cell in ("1700000000.000000", "32.000000"))
+        text += "".join("\n" + ",".join(map(str, row[-n - (n == 1) :][:n])) for row in rows)
+        recordings = read(text)
+        assert (recordings.detected[0][0].format, recordings.detected[0][0].columns) == ("Empatica CSV", names)
+        np.testing.assert_array_equal(
+            recordings.demonstrations.recorded, [row[:n] if n > 1 else row[1:2] for row in rows]
+        )
+        np.testing.assert_array_equal(recordings.demonstrations.times, 1.7e9 + np.arange(N) / 32)
+        np.testing.assert_allclose(np.diff(read(text, units=0.5).demonstrations.times), 0.5)
+
+
 def test_qualisys_bodies_are_positions_and_angles():
     recordings = read(qualisys_bodies(), "a.tsv")
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]

@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from kineme.errors import DataError
+from kineme.movements.tables.time_stamps import UNIX
+from kineme.movements.trajectories.movements import axis_names
 from kineme.units import unit_named
 
 _SECTIONS = ("trajectories", "segments", "objects", "joints", "model outputs", "devices")  # the first one there is read
 _OTHERS = ("events",)
 _QUATERNION = ("rx", "ry", "rz", "rw")
 
+_FASTEST = 1000.0  # Hz
 _EULER = re.compile(r"\b[xyz]{3}\b")
 _FIRST = "PathFileType"
 _EMPTY = " \t\r\n,;"  # what a line without values consists of
@@ -49,6 +52,7 @@ class ExportHead(NamedTuple):
     end: int | None = None  # line after the last sample; None: the samples reach to the end of the file
     rate: float | None = None  # samples per second, where the head says it
     zeros_are_gaps: bool = False  # whether three zeros in place of a marker mean that it was not found
+    start: float = 0.0  # time of the first sample [s], where the head says the rate
     packed: bool = False  # whether cells hold several numbers between commas; `heads` has one for each number
 
     @property
@@ -132,6 +136,23 @@ def _unit(name: str, in_degrees: str, title: str) -> str:
     if _TRANSLATION.search(plain):
         return "m"
     return "deg" if in_degrees.lower() == "yes" else "rad" if coordinates else ""
+
+
+def empatica_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """Return the head of a sensor's file of an Empatica E4, or None if the first lines do not look like one.
+
+    Source: Empatica, "E4 data: export format". A row of the time of the first sample, in seconds since 1970, a row of
+    the rate, both once for each column, and the samples.
+    """
+    separator = next((mark for mark in ",;\t" if lines and mark in lines[0]), ",")
+    rows = [cells_of(line, separator) for line in lines[:3]]
+    if len(rows) < 3 or len({*map(len, rows)}) > 1 or any(len({*row}) > 1 for row in rows[:2]):
+        return None
+    start, rate = (positive(row[0]) for row in rows[:2])
+    if start is None or not UNIX[0] <= start <= UNIX[1] or rate is None or rate > _FASTEST:
+        return None
+    heads = axis_names(len(rows[0]))
+    return ExportHead("Empatica", separator, tuple(heads), ("",) * len(heads), 2, None, rate, start=start)
 
 
 def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:

@@ -148,7 +148,6 @@ def _parsed(data: bytes) -> list[_Content]:
         if tag.rpartition(":")[2] == "subject" and any(contents[-1].names.values()):  # another one
             contents.append(_Content(contents[-1].path))
         contents[-1].start(tag, attributes)
-
         parser.EndElementHandler, parser.CharacterDataHandler = contents[-1].end, contents[-1].characters
 
     parser.StartElementHandler = start

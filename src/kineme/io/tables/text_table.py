@@ -52,7 +52,7 @@ _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
 _MAKERS = (
     export_heads.optitrack_head, export_heads.vicon_head, export_heads.qualisys_head, export_heads.trc_head,
-    export_heads.opensim_head,
+    export_heads.opensim_head, export_heads.empatica_head,
 )  # fmt: skip
 _LINE = 100  # bytes of a line in Python, beside its characters
 _MOSTLY = 0.75  # of its steps, by which a column of times increases, though some are faulty
@@ -285,6 +285,8 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
     """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
     head, dialect = export
+    if not head.is_timed and isinstance(layout.units, float | int):
+        head = head._replace(rate=None)  # the step that the caller says wins
     data = data.replace(b",", b"\t") if head.packed else data
     _check_memory(data, dialect)
     more = head.rate is not None and not head.is_timed  # a column of the times that follow from the rate
@@ -305,7 +307,7 @@ def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[A
         frames, parts = counted.get("frame"), counted.get("sub frame")
         if frames is None or (parts is not None and parts.any()):  # frames are divided or not counted
             frames = np.arange(len(columns[0]))
-        columns = [*columns, (frames - frames[0]) / head.rate]
+        columns = [*columns, head.start + (frames - frames[0]) / head.rate]
     elif head.rate is not None and "frame" in head.heads:
         k, frames = head.heads.index(export_heads.STAMP), columns[head.heads.index("frame")]
         even = columns[k][0] + (frames - frames[0]) / head.rate

@@ -23,7 +23,8 @@ TIME_UNITS = frozenset(name for name, unit in UNITS.items() if unit.quantity == 
 
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+")  # camelCase, snake_case, [units] apart
 
-_UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds since 1970
+#: The years 2000 to 2100, in seconds since 1970.
+UNIX = (946_684_800.0, 4_102_444_800.0)
 
 #: Shortest step between samples, in units of the stamps, at which they are taken to be in that unit. Movements are not
 #: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
@@ -93,7 +94,7 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     step = float(np.median(steps)) if len(steps) else 0.0
     of_date = {*words_of(head)} & _DATE_WORDS
     for (unit, per_second), finer in zip(PER_SECOND.items(), [*PER_SECOND, ""][1:], strict=True):
-        if not _UNIX[0] <= finite[0] / per_second <= _UNIX[1] or (step / per_second >= _LONGEST and not of_date):
+        if not UNIX[0] <= finite[0] / per_second <= UNIX[1] or (step / per_second >= _LONGEST and not of_date):
             continue
         if finer and step / per_second >= 1.0 and not of_date:
             raise DataError(
