@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -119,7 +119,8 @@ def _increasing(times: Array, usable: Flags) -> Flags:
     ends, last, before = list[float](), list[int](), np.full(len(times), -1)  # per length the run that ends earliest
     for k in np.flatnonzero(usable).tolist():
         t = float(times[k])
-        n = bisect_left(ends, True, key=lambda end, t=t: not t - end >= SHORTEST_STEP)
+        n = bisect_right(ends, t - SHORTEST_STEP)
+        n -= n > 0 and t - ends[n - 1] < SHORTEST_STEP  # rounded
         before[k] = last[n - 1] if n else -1
         if n == len(ends) or t < ends[n]:
             ends[n : n + 1], last[n : n + 1] = [t], [k]

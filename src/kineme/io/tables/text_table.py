@@ -29,7 +29,7 @@ from kineme.io.tables.dialect import (
     numbers_in,
     split,
 )
-from kineme.movements.tables.columns import Roles, choose_roles, counts_samples
+from kineme.movements.tables.columns import Roles, choose_roles, counts_samples, with_times_that_increase
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import FLAGS, Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
@@ -55,7 +55,6 @@ _MAKERS = (
     export_heads.opensim_head, export_heads.empatica_head,
 )  # fmt: skip
 _LINE = 100  # bytes of a line in Python, beside its characters
-_MOSTLY = 0.75  # of its steps, by which a column of times increases, though some are faulty
 _SAMPLES = 5  # in which decimal commas are looked for
 _ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
 
@@ -139,34 +138,8 @@ def _roles_and_rows(
     if counters & {*roles.positions}:
         rows, faults = _rows(data, encoding, dialect, texts | counters - {*roles.positions})
     if roles.time is not None and not (dialect.named or dated or layout.time is not None):
-        roles = _with_times_that_increase(roles, rows[f"c{roles.time}"], layout)
+        roles = with_times_that_increase(roles, rows[f"c{roles.time}"], layout)
     return dialect, roles, rows, faults
-
-
-def _with_times_that_increase(roles: Roles, stamps: Array, layout: Layout) -> Roles:
-    """Take a column for times that nobody named so only if it increases, where `units` may be the step without one."""
-    k, stamps = roles.time, stamps[np.isfinite(stamps)]
-    assert k is not None
-    steps = np.diff(stamps)
-    increases = len(steps) == 0 or np.mean(steps > 0) > _MOSTLY
-    is_step = isinstance(layout.units, float | int)
-    if increases and is_step and (stamps != np.rint(stamps)).any():
-        raise DataError(
-            f"expected to know whether units={layout.units:g} is the unit of times or the step between samples, "
-            f"got numbers with fractions that increase in column {k}; say time={k} if they are times, else columns= "
-            f"with {k} among them or exclude={k}, in the shell --time, --columns, --exclude"
-        )
-    if increases:
-        return roles
-    if not is_step:
-        raise DataError(
-            f"expected times in column {k}, since the table has no heads, got numbers that do not increase; say which "
-            "has them with time=, or the step between samples with units= where there are none, in the shell --time, "
-            "--units"
-        )
-    if layout.coordinates is not None:
-        return roles._replace(time=None, ignored=(*roles.ignored, k))
-    return roles._replace(time=None, positions=tuple(sorted((k, *roles.positions))))
 
 
 def _check_written(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> None:

@@ -52,6 +52,7 @@ _DERIVATIVE_WORDS = frozenset(
 )  # fmt: skip
 #: Words of columns that say how sure the position of the same name is.
 _CONFIDENCE_WORDS = frozenset({"confidence", "conf", "likelihood", "score", "visibility", "presence", "residual"})
+_MOSTLY = 0.75  # of its steps, by which a column of times increases, though some are faulty
 _AXES = frozenset("xyz")
 _BESIDE_AZ = ("el", "elevation", "x", "y", "ax", "ay")  # what tells an azimuth from an acceleration along z
 
@@ -134,6 +135,32 @@ def choose_roles(
     ignored = tuple(k for k in range(len(heads)) if k not in used)
     beside_time = tuple(k for k in others if k is not None and k not in positions)
     return Roles(time, positions, movement, label, ignored, nanoseconds, person, beside_time, apart)
+
+
+def with_times_that_increase(roles: Roles, stamps: Any, layout: Layout) -> Roles:
+    """Take a column for times that nobody named so only if it increases, where `units` may be the step without one."""
+    k, stamps = roles.time, stamps[np.isfinite(stamps)]
+    assert k is not None
+    steps = np.diff(stamps)
+    increases = len(steps) == 0 or np.mean(steps > 0) > _MOSTLY
+    is_step = isinstance(layout.units, float | int)
+    if increases and is_step and (stamps != np.rint(stamps)).any():
+        raise DataError(
+            f"expected to know whether units={layout.units:g} is the unit of times or the step between samples, "
+            f"got numbers with fractions that increase in column {k}; say time={k} if they are times, else columns= "
+            f"with {k} among them or exclude={k}, in the shell --time, --columns, --exclude"
+        )
+    if increases:
+        return roles
+    if not is_step:
+        raise DataError(
+            f"expected times in column {k}, since the table has no heads, got numbers that do not increase; say which "
+            "has them with time=, or the step between samples with units= where there are none, in the shell --time, "
+            "--units"
+        )
+    if layout.coordinates is not None:
+        return roles._replace(time=None, ignored=(*roles.ignored, k))
+    return roles._replace(time=None, positions=tuple(sorted((k, *roles.positions))))
 
 
 def _number(heads: Sequence[str], column: Column) -> int:

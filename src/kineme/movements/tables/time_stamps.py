@@ -135,7 +135,8 @@ def same_rate(times: Array, others: Array) -> bool:
     if not len(b) or np.mean(b > 0) < _RUNNING:
         return True
     on = (a >= 0) & (b >= 0)
-    return bool(abs(np.sum(a[on] - b[on])) <= (_STEPS_APART / max(1, np.count_nonzero(on)) + _RATE) * np.sum(a[on]))
+    passed, n_steps = float(a[on].sum()), max(1, int(np.count_nonzero(on)))
+    return abs(passed - float(b[on].sum())) <= (_STEPS_APART / n_steps + _RATE) * passed
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
