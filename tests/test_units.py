@@ -42,19 +42,20 @@ FACTS = {
     "force": [(1.0, ["N", "newtons"])],
     "torque": [(1.0, ["Nm", "N.m", "N·m", "N*m"]), (1e-3, ["Nmm", "N.mm", "N·mm", "mm.N"])],
     "power": [(1.0, ["W", "watts"])],
-    "voltage": [(1.0, ["V", "volts"]), (1e-3, ["mV"])],
+    "voltage": [(1.0, ["V", "volts"]), (1e-3, ["mV"]), (1e-6, ["uV", "µV", "μV"])],
     "current": [(1.0, ["A", "amps"]), (1e-3, ["mA"])],
+    "magnetic flux density": [(1e-6, ["uT", "µT", "μT"])],
     "image": [(1.0, ["px", "pixels"])],
     "count": [(1.0, ["count", "counts", "ticks"])],
     "frames": [(1.0, ["frame", "frames"])],
     "angle/time": [
-        (math.radians(1), ["deg/s", "°/s", "degrees per second"]),
+        (math.radians(1), ["deg/s", "°/s", "degrees per second", "dps"]),
         (1.0, ["rad/s"]),
         (math.pi / 30, ["rev/min"]),
     ],
     "angle/time^2": [(math.radians(1), ["deg/s^2", "deg/s²"]), (1.0, ["rad/s2"])],
     "length/time": [(1.0, ["m/s"]), (1e-3, ["mm/s"]), (1 / 3.6, ["km/h"])],
-    "length/time^2": [(1.0, ["m/s^2", "m/s²", "m/s2", "m/s**2"]), (1e-3, ["mm/s^2"])],
+    "length/time^2": [(1.0, ["m/s^2", "m/s²", "m/s2", "m/s**2", "m/(s^2)", "[m/(sec^2)]"]), (1e-3, ["mm/s^2"])],
     "force/mass": [(1.0, ["N/kg"])],
 }
 ROWS = [(quantity, size, names) for quantity, facts in FACTS.items() for size, names in facts]

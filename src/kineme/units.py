@@ -56,6 +56,9 @@ _TABLE = (
     (Unit("W", "power", Fraction(1)), "w watt(s)"),
     (Unit("V", "voltage", Fraction(1)), "v volt(s)"),
     (Unit("mV", "voltage", Fraction("1e-3")), "mv millivolt(s)"),
+    (Unit("uV", "voltage", Fraction("1e-6")), "uv µv μv microvolt(s)"),
+    (Unit("uT", "magnetic flux density", Fraction("1e-6")), "ut µt μt microtesla(s)"),
+    (Unit("deg/s", "angle/time", tau / 360), "dps"),
     (Unit("A", "current", Fraction(1)), "a ampere(s) amp(s)"),
     (Unit("mA", "current", Fraction("1e-3")), "ma milliampere(s)"),
     (Unit("px", "image", Fraction(1)), "px pixel(s)"),
@@ -77,7 +80,7 @@ UNITS = {name: unit for unit, names in _TABLE for name in _spellings(names)}
 
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 _AFTER_NUMBER = re.compile(r"(?<=^100) (?=ns$)")
-_QUOTIENT = re.compile(r"(.+?)\s*(?:/|\bper\b)\s*([^/]+?)\s*(?:\^|\*\*)?([2²])?")
+_QUOTIENT = re.compile(r"(.+?)\s*(?:/|\bper\b)\s*\(?([^/()]+?)\s*(?:\^|\*\*)?([2²])?")
 
 
 @lru_cache(maxsize=1024)

@@ -143,6 +143,18 @@ def test_frames_of_mvnx_without_a_quantity_are_gaps_and_stamps_that_stand_still_
     np.testing.assert_allclose(read(mvnx(times=uneven), "walk.mvnx").demonstrations.times, np.array(uneven) / 1e3)
 
 
+def test_each_subject_of_mvnx_is_a_movement():
+    one, end = mvnx().removesuffix("</mvnx>"), "</mvnx>"
+    other = one[one.index("<subject") :].replace('"Ann"', '"Bo"').replace("<position>0.0 0.0 1", "<position>9 0.0 1")
+    recordings = read(one + other + end, "walk.mvnx")
+    assert [source.place for source in recordings.sources] == ["Ann", "Bo"]
+    ann, bo = recordings.demonstrations
+    np.testing.assert_array_equal(ann.times, bo.times)
+    assert (ann.positions[0, 0], bo.positions[0, 0]) == (0, 9)
+    with pytest.raises(DataError, match="got others of 'Bo' than of 'Ann'; export each to a file of its own"):
+        read(one + other.replace("L5", "L3") + end, "walk.mvnx")
+
+
 BOMB = '<!DOCTYPE lolz [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
 
 

@@ -175,6 +175,13 @@ def test_a_second_clock_is_excluded():
     assert read(data, exclude="timestamp [s]").demonstrations.dimensions == ("x",)
 
 
+def test_numbers_of_columns_that_are_excluded_count_once_over_all_of_the_file():
+    t = np.arange(50) / 50
+    data = table(t, np.column_stack([t, t**2, t**3]), ("x", "y", "z"))
+    assert read(data, exclude=1).demonstrations.dimensions == ("y", "z")
+    assert read(data, exclude="1").demonstrations.dimensions == ("y", "z")
+
+
 def test_the_shell_takes_names_with_commas_in_quotes(tmp_path):
     t = np.arange(50) / 50
     heads = ("x", '"Joint, 2"', "y")
@@ -255,6 +262,17 @@ def test_gaps_of_arrays_and_tables_are_filled_alike(tmp_path, suffix):
     recordings = read_recordings(path)
     np.testing.assert_allclose(recordings.demonstrations.positions, x, atol=1e-4)
     assert recordings.sources[0].filled == 5
+
+
+def test_gaps_of_movements_without_stamps_are_filled_by_their_share_of_the_movement():
+    x = np.sin(np.arange(101) / 20)
+    text = ",".join("?" if 30 <= k < 34 else f"{value:.6f}" for k, value in enumerate(x))
+    series = f"@timeStamps false\n@missing true\n@classLabel true a\n@data\n{text}:a\n"
+    recordings = read_recordings_from_bytes(series.encode(), "a.ts", Layout())
+    np.testing.assert_allclose(recordings.demonstrations.positions[:, 0], x, atol=1e-3)
+    assert (recordings.sources[0].filled, recordings.sources[0].longest_gap) == (4, pytest.approx(0.05))
+    with pytest.raises(DataError, match=r"for up to 0.05 s; say --fill-gaps 0.05 or"):
+        read_recordings_from_bytes(series.encode(), "a.ts", Layout(fill_gaps=0.04))
 
 
 def test_a_library_takes_its_columns_from_recordings_with_more(tmp_path):

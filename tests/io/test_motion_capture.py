@@ -1,5 +1,7 @@
 """Text exports of motion capture systems, in the layouts that their makers document; BVH; C3D written by ezc3d."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -161,6 +163,21 @@ def test_motive_rigid_bodies_are_poses_and_what_follows_from_them_is_left_aside(
     assert markers.dimensions == ("Marker1.x", "Marker1.y", "Marker1.z")
 
 
+def test_motive_without_a_column_of_times_keeps_its_first_coordinate():
+    timed = motive(rigid=False)
+    bare = "\n".join(re.sub(r"^(Frame|\d*),[^,]*,(?!1.23)", r"\1,", line) for line in timed.splitlines())
+    assert "\nFrame,X,Y,Z\n" in bare
+    np.testing.assert_allclose(read(bare).demonstrations.recorded, read(timed).demonstrations.recorded)
+
+
+@pytest.mark.parametrize(("order", "name"), [("XYZ", "rotation"), ("ZYX", "rotation_zyx"), ("Euler", "rotation")])
+def test_motive_angles_in_an_order_of_their_own_are_named_by_it(order, name):
+    text = motive().replace("Type,Quaternion", f"Type,{order}").replace("X,Y,Z,W,X,Y,Z", "X,Y,Z,,X,Y,Z")
+    channels = read(text).demonstrations.channels
+    assert recorded_names(channels)[:3] == tuple(f"Cup.{name}.{axis}" for axis in "xyz")
+    assert [(channel.kind, channel.unit) for channel in channels][:3] == [("angle", "deg")] * 3
+
+
 def test_qualisys_times_come_from_the_frequency_or_from_their_column():
     for headed in (False, True):
         recordings = read(qualisys(headed), "a.tsv")
@@ -186,6 +203,28 @@ def test_zeros_and_nothing_in_place_of_a_marker_of_trc_are_a_gap(zeros):
     assert (recordings.sources[0].filled, recordings.problems) == (2, ())
     expected = read(complete, "walk.trc").demonstrations.positions
     np.testing.assert_allclose(recordings.demonstrations.positions, expected, atol=0.5)
+
+
+@pytest.mark.parametrize("export", [vicon, motive])
+def test_exports_that_a_european_program_for_tables_has_saved(export):
+    text = re.sub(r"(?<=\d)\.(?=\d)", "@", export()).replace(",", ";").replace("@", ",")
+    saved = text.replace("\r", "").strip().replace("\n\n", "\n;;;\n")
+    np.testing.assert_array_equal(read(saved).demonstrations.recorded, read(export()).demonstrations.recorded)
+    assert read(saved).detected[0][0] == read(export()).detected[0][0]
+
+
+def test_the_first_two_rows_of_an_empatica_are_its_start_and_its_rate():
+    rows = [(k, k * k, 5) for k in range(N)]
+    for n, names in (3, ("x", "y", "z")), (1, ("x",)):
+        text = "\n".join(", ".join([cell] * n) for cell in ("1700000000.000000", "32.000000"))
+        text += "".join("\n" + ",".join(map(str, row[-n - (n == 1) :][:n])) for row in rows)
+        recordings = read(text)
+        assert (recordings.detected[0][0].format, recordings.detected[0][0].columns) == ("Empatica CSV", names)
+        np.testing.assert_array_equal(
+            recordings.demonstrations.recorded, [row[:n] if n > 1 else row[1:2] for row in rows]
+        )
+        np.testing.assert_array_equal(recordings.demonstrations.times, 1.7e9 + np.arange(N) / 32)
+        np.testing.assert_allclose(np.diff(read(text, units=0.5).demonstrations.times), 0.5)
 
 
 def test_qualisys_bodies_are_positions_and_angles():
@@ -252,6 +291,13 @@ def test_a_row_of_units_below_the_heads_is_not_a_sample(units):
     assert (how.measured_in, recordings.problems) == (("mm", "deg"), ())
     np.testing.assert_allclose(recordings.demonstrations.times, np.arange(N) / 100)
     assert how.units_from == ("head" if "ms" in units else "by its steps")
+
+
+@pytest.mark.parametrize("unit", ["m/(s^2)", "no_units", "local_flux", "kOhms", "%MVC", "µV", "uT", "dps"])
+def test_a_row_of_units_may_hold_some_that_nobody_knows(unit):
+    rows = "".join(f"{10 * k},{k},{k * k}\n" for k in range(N))
+    how = read(f"time,x,y\nms,{unit},{unit}\n{rows}").detected[0][0]
+    assert (how.units, how.columns, how.measured_in) == ("ms", ("x", "y"), (unit, unit))
 
 
 def test_names_and_gaps_below_the_heads_are_not_units():

@@ -107,6 +107,23 @@ def test_a_second_clock_is_left_aside_where_the_time_is_said(tmp_path):
     assert chosen.demonstrations.dimensions == ("x", "seconds_elapsed")
 
 
+@pytest.mark.parametrize(
+    ("heads", "first", "second"), [("X [s],emg,X [s],acc", 0, 2), ("time_emg,emg,time_acc,acc", "time_emg", "time_acc")]
+)
+def test_values_at_the_times_of_another_sensor_are_refused(tmp_path, heads, first, second):
+    """As Delsys writes them, each sensor at its own rate behind its own clock."""
+    rows = [f"{k / 1000},{k},{k / 750},{k * k}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join([heads, *rows]))
+    with pytest.raises(kineme.errors.DataError, match=rf"in column 2, which runs at another rate.* exclude={second!r}"):
+        kineme.read_recordings(tmp_path / "a.csv", time=first)
+    for choice in ({"columns": "emg"}, {"exclude": second}):
+        read = kineme.read_recordings(tmp_path / "a.csv", time=first, **choice).demonstrations
+        assert read.dimensions == ("emg", *["acc"] * ("exclude" in choice))
+    alike = [f"{k / 1000},{k},{k / 1000},{k * k}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join([heads, *alike]))
+    assert kineme.read_recordings(tmp_path / "a.csv", time=first).demonstrations.dimensions == ("emg", "acc")
+
+
 def test_what_rostopic_echo_p_writes(tmp_path):
     """Times in %time, the first head, in nanoseconds."""
     heads = (

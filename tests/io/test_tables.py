@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -196,7 +197,7 @@ def test_heads_that_are_not(head):
     ],
 )
 def test_columns_find_their_roles(heads, roles):
-    assert choose_roles(heads.split(), ["number"] * len(heads.split()), Layout()) == (*roles, None, None, ())
+    assert choose_roles(heads.split(), ["number"] * len(heads.split()), Layout()) == (*roles, None, None, (), ())
 
 
 def test_roles_that_are_given_win():
@@ -283,9 +284,8 @@ def test_rows_of_several_things_in_turns_are_noted(head, names, apart, noted, ba
         (note,) = recordings.notes
         assert f"which {head} names in turns" in note
         assert "--movement" in note
-        assert read(lines(rows, f"t,{head},x,y"), movement=head).notes == ()
-    else:
-        assert recordings.notes == ()
+        recordings = read(lines(rows, f"t,{head},x,y"), movement=head)
+    assert "in turns" not in " ".join(recordings.notes)  # gaps between their samples are noted
 
 
 @pytest.mark.parametrize(
@@ -382,29 +382,31 @@ def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled
 @pytest.mark.parametrize(
     ("times", "reason", "remaining"),
     [
-        (
-            (0, 1, 1, 2, 3, 4),
-            "got duplicate stamps 1 and 1 s at sample 2; leave such samples out with --skip sample",
-            [0, 1, 2, 3, 4],
-        ),
+        ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
         (
             (0, 1, 2, 1.5, 1.7, 3),
             "got decreasing stamps 2 and 1.5 s at sample 3; if several movements .*, --movement",
-            [0, 1, 2, 3],
+            [0, 1, 1.5, 1.7, 3],
         ),
+        ((0, 1, 1000, 2, 3, 4), "got decreasing stamps 1000 and 2 s at sample 3", [0, 1, 2, 3, 4]),
+        ((0, 1000, 1001, 2, 3, 4), "got decreasing stamps 1001 and 2 s at sample 3", [0, 2, 3, 4]),
         ((0, 1, "inf", 3, 4, 5), "expected finite times, got inf at sample 2", [0, 1, 3, 4, 5]),
-        ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", None),
+        ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", [0, 1, 2, 3, 6]),
+        ((5, 4, 3, 2, 1, 6), "got decreasing stamps 5 and 4 s at sample 1", None),
     ],
 )
 def test_time_must_go_on(times, reason, remaining):
     text = lines([(t, k, -k) for k, t in enumerate(times)], "time,x,y")
-    with pytest.raises(kineme.errors.DataError, match=rf"line [345]: .*{reason}"):
+    with pytest.raises(kineme.errors.DataError, match=rf"line [345]: .*{reason}") as refused:
         read(text)
+    assert ("leave such samples out with --skip sample" in str(refused.value)) == ("duplicate" in reason)
     if remaining is None:
         with pytest.raises(kineme.errors.DataError, match="expected at least 4 samples, got 2"):
             read(text, skip="sample")
     else:
-        assert read(text, skip="sample").demonstrations.times.tolist() == remaining
+        recordings = read(text, skip="sample")
+        assert recordings.demonstrations.times.tolist() == remaining
+        assert re.search(reason, recordings.problems[0].reason)
 
 
 @pytest.mark.parametrize("text", ["time,x,y,\n" + "".join(f"{k},1,{k},\n" for k in range(5))])
@@ -548,6 +550,21 @@ def test_several_lines_of_heads_are_one(tmp_path, names):
     np.testing.assert_array_equal(demos[0].positions, frame.to_numpy()[:, [0, 1, 3, 4]])
 
 
+@pytest.mark.parametrize(
+    ("heads", "names", "unit"),
+    [
+        ("Time,Hand,,,\n,x,y,z,", ["Hand.x", "Hand.y", "Hand.z"], None),
+        ("Time,Hand,Hand,Hand,\n,x,y,z,\ns,m,m,m,", ["Hand.x", "Hand.y", "Hand.z"], "m"),
+        (",Hand,,,\nTime,x,y,z,\ns,mm,mm,mm,", ["Hand.x", "Hand.y", "Hand.z"], "mm"),
+        ("Time,left,,right,\n,Hand,,,\n,x,y,z,", ["left.Hand.x", "left.Hand.y", "right.z"], None),
+    ],
+)
+def test_a_head_stands_also_above_the_empty_cells_to_its_right(heads, names, unit):
+    recordings = read("\n".join([heads, *(f"{k / 10},{k},{k * k},{k % 3}," for k in range(8))]))
+    assert recordings.detected[0][0].columns == tuple(names)
+    assert recordings.detected[0][0].measured_in == ((unit,) * 3 if unit else ())
+
+
 def test_times_that_are_not_understood_are_shown():
     for stamp in ("01/05/2024 10:00:0{}", "5/1/2024 11:59:5{} PM", "10:00:01:00{}"):
         with pytest.raises(
@@ -567,6 +584,25 @@ def test_lines_above_the_heads_are_passed_over(mark):
     for above in (mark.join("12"), mark.join(("time", "x"))):  # another table, or heads that lack one
         with pytest.raises(kineme.errors.DataError):
             read(f"{above}\n{rows}")
+
+
+def test_a_first_column_without_a_head_that_does_not_increase_is_no_time():
+    x = np.sin(np.arange(20))
+    oscillates = [(a, k / 7, k) for k, a in enumerate(x)]
+    with pytest.raises(kineme.errors.DataError, match=r"numbers that do not increase; say which has them .* --units"):
+        read(lines(oscillates, "").strip())
+    for choice, columns in ({}, ["column 0", "column 1", "column 2"]), ({"columns": [1, 2]}, ["column 1", "column 2"]):
+        recordings = read(lines(oscillates, "").strip(), units=0.5, **choice)
+        assert recordings.detected[0][0].columns == tuple(columns)
+        np.testing.assert_array_equal(recordings.demonstrations.times, np.arange(20) / 2)
+    increases = [(k / 7, a, k) for k, a in enumerate(x)]
+    with pytest.raises(kineme.errors.DataError, match="say time=0 if they are times, else columns= with 0 among them"):
+        read(lines(increases, "").strip(), units=0.5)
+    for choice, n_dims, end in ({"time": 0}, 2, 19 / 14), ({"columns": [0, 1, 2]}, 3, 9.5), ({"exclude": 0}, 2, 9.5):
+        demos = read(lines(increases, "").strip(), units=0.5, **choice).demonstrations
+        assert (demos.n_dims, demos.times[-1]) == (n_dims, pytest.approx(end))
+    counted = read(lines([(k, a) for k, a in enumerate(x)], "").strip(), units=0.5).demonstrations  # as frames
+    assert (counted.n_dims, counted.times[-1]) == (1, 9.5)
 
 
 def test_a_line_that_numbers_the_columns_is_no_sample():

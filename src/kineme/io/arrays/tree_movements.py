@@ -103,7 +103,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: str = NAMES, man
 
     roles = choose_roles(heads, kinds, layout, values=values)
     counters = [k for k in roles.ignored if roles.time is None and counts_samples(heads[k], heads)]
-    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks, *counters]
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks, *roles.apart, *counters]
     needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(movements, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)

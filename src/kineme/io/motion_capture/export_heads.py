@@ -7,13 +7,18 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from kineme.errors import DataError
+from kineme.movements.tables.time_stamps import UNIX
+from kineme.movements.trajectories.movements import axis_names
 from kineme.units import unit_named
 
 _SECTIONS = ("trajectories", "segments", "objects", "joints", "model outputs", "devices")  # the first one there is read
 _OTHERS = ("events",)
 _QUATERNION = ("rx", "ry", "rz", "rw")
 
+_FASTEST = 1000.0  # Hz
+_EULER = re.compile(r"\b[xyz]{3}\b")
 _FIRST = "PathFileType"
+_EMPTY = " \t\r\n,;"  # what a line without values consists of
 
 _POSES = ("x", "y", "z", "roll", "pitch", "yaw", "residual", *(f"rot[{k}]" for k in range(9)))
 
@@ -47,6 +52,7 @@ class ExportHead(NamedTuple):
     end: int | None = None  # line after the last sample; None: the samples reach to the end of the file
     rate: float | None = None  # samples per second, where the head says it
     zeros_are_gaps: bool = False  # whether three zeros in place of a marker mean that it was not found
+    start: float = 0.0  # time of the first sample [s], where the head says the rate
     packed: bool = False  # whether cells hold several numbers between commas; `heads` has one for each number
 
     @property
@@ -132,6 +138,23 @@ def _unit(name: str, in_degrees: str, title: str) -> str:
     return "deg" if in_degrees.lower() == "yes" else "rad" if coordinates else ""
 
 
+def empatica_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
+    """Return the head of a sensor's file of an Empatica E4, or None if the first lines do not look like one.
+
+    Source: Empatica, "E4 data: export format". A row of the time of the first sample, in seconds since 1970, a row of
+    the rate, both once for each column, and the samples.
+    """
+    separator = next((mark for mark in ",;\t" if lines and mark in lines[0]), ",")
+    rows = [cells_of(line, separator) for line in lines[:3]]
+    if len(rows) < 3 or len({*map(len, rows)}) > 1 or any(len({*row}) > 1 for row in rows[:2]):
+        return None
+    start, rate = (positive(row[0]) for row in rows[:2])
+    if start is None or not UNIX[0] <= start <= UNIX[1] or rate is None or rate > _FASTEST:
+        return None
+    heads = axis_names(len(rows[0]))
+    return ExportHead("Empatica", separator, tuple(heads), ("",) * len(heads), 2, None, rate, start=start)
+
+
 def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
     """Return the head of an export of Motive, or None if the first line does not look like one.
 
@@ -139,11 +162,12 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     ``Format Version,1.23,...,Length Units,Meters``. After an empty line there are rows with the type, the name, the id
     and more of each column, then one with what it holds, and the row of heads ``Frame,Time (Seconds),X``.
     """
-    cells = cells_of(lines[0], ",") if lines else []
-    if not cells or cells[0].lower() != "format version":
+    marks = (mark for mark in ",;\t" if lines and cells_of(lines[0], mark)[0].lower() == "format version")
+    if (separator := next(marks, None)) is None:
         return None
+    cells = cells_of(lines[0], separator)
     said = dict(zip((cell.lower() for cell in cells[::2]), cells[1::2], strict=False))
-    rows = [cells_of(line, ",") for line in lines]
+    rows = [cells_of(line, separator) for line in lines]
     at = next((k for k, row in enumerate(rows) if [cell.lower() for cell in row[:1]] == ["frame"]), None)
     if at is None:
         raise DataError("expected an OptiTrack export with a row of heads 'Frame, Time (Seconds), X, ...', got none")
@@ -154,12 +178,15 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     n = len(rows[at])
     kinds, names, contents = ((row + [""] * n)[:n] for row in (above[0], above[1], above[-1]))
     solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)
-    plain = without_common_subject(names[2:])
-    quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
+    rotations = said.get("rotation type", "quaternion").lower()
+    quaternions, order = "quaternion" in rotations, _EULER.search(rotations)
+    # Of three angles the order is in the name where it is not that of most exports: others are other angles.
+    turning = "orientation" if quaternions else f"rotation_{order[0]}" if order and order[0] != "xyz" else "rotation"
     timed = n > 1 and rows[at][1].lower().startswith("time")
-    heads, units = ["frame", STAMP if timed else ""], ["", "s"]
-    axes = [cell.lower() for cell in rows[at][2:]]
-    for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], axes, strict=True):
+    heads, units = ["frame", *[STAMP] * timed], ["", *["s"] * timed]
+    before = len(heads)
+    plain, axes = without_common_subject(names[before:]), [cell.lower() for cell in rows[at][before:]]
+    for kind, name, content, axis in zip(kinds[before:], plain, contents[before:], axes, strict=True):
         what = content.lower()
         left_out = (solved and kind.lower() in _EXPECTED) or axis not in "xyzw" or not axis
         if left_out or what not in ("position", "rotation"):
@@ -167,12 +194,12 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
         elif what == "position":
             heads.append(f"{name}.position.{axis}" if solved else f"{name}.{axis}")
         else:
-            heads.append(f"{name}.{'orientation' if quaternions else 'rotation'}.{axis}")
+            heads.append(f"{name}.{turning}.{axis}")
         units.append(
             "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
         )
     rate = positive(said.get("export frame rate") or said.get("capture frame rate") or "")
-    return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
+    return ExportHead("OptiTrack", separator, tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)
 
 
 def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) -> ExportHead | None:
@@ -264,7 +291,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     with ``subject:marker`` above the first column of each, the row of heads ``Frame,Sub Frame,X,Y,Z,...``, a row of
     units, and the samples up to an empty line.
     """
-    first = next((k for k, line in enumerate(lines) if line.strip(" \t\r\n,")), None)
+    first = next((k for k, line in enumerate(lines) if line.strip(_EMPTY)), None)
     if first is None or _name(lines[first]) not in (*_SECTIONS, *_OTHERS):
         return None
     starts = {_name(line): k for k, line in reversed(list(enumerate(lines))) if _name(line) in _SECTIONS}
@@ -274,8 +301,8 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     at = starts[section]
     if len(lines) < at + 5:
         raise DataError(f"expected samples below the section {section!r} of a Vicon export, got its head alone")
-    separator = "\t" if "\t" in lines[at + 3] else ","
-    rate = positive(lines[at + 1].strip(" \t\r\n,"))
+    separator = next((mark for mark in "\t;" if mark in lines[at + 3]), ",")
+    rate = positive(lines[at + 1].strip(_EMPTY))
     names, heads, units = (cells_of(line, separator) for line in lines[at + 2 : at + 5])
     if rate is None or not heads or heads[0].lower() != "frame":
         raise DataError(f"expected a rate, names and the heads 'Frame, Sub Frame, ...' below the section {section!r}")
@@ -288,7 +315,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     columns = [_head(section, *column) for column in zip(plain, heads[:n], turned, strict=True)]
     columns[0] = "frame"
     columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
-    end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(" \t\r\n,")), None)
+    end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(_EMPTY)), None)
     measured_in = tuple(
         "" if quaternion else unit for unit, quaternion in zip((units + [""] * n)[:n], turned, strict=True)
     )
@@ -296,7 +323,7 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
 
 
 def _name(line: str) -> str:
-    return line.strip(" \t\r\n,\ufeff").lower()
+    return line.strip(f"{_EMPTY}\ufeff").lower()
 
 
 def _head(section: str, name: str, head: str, quaternion: bool) -> str:

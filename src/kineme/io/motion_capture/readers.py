@@ -24,8 +24,8 @@ from kineme.io.motion_capture.export_heads import STAMP, positive, without_commo
 from kineme.io.records import damaged_as, needs
 from kineme.movements.channels.column_match import Columns
 from kineme.movements.tables.columns import Roles, choose_roles
-from kineme.movements.tables.layout import Layout, no_lines
-from kineme.movements.tables.table import Table
+from kineme.movements.tables.layout import Layout, distinct, no_lines
+from kineme.movements.tables.table import Segments, Table
 
 _DEEPEST = 32
 _MOST = 10_000  # segments and joints, or channels
@@ -44,23 +44,25 @@ _QUANTITIES = {
 
 
 class _Content:
-    def __init__(self) -> None:
-        self.rate = ""
+    """What an MVNX file says of one subject."""
+
+    def __init__(self, path: Sequence[str] = ()) -> None:
+        self.rate = self.label = ""
         self.names: dict[str, list[str]] = {"segment": [], "joint": []}
         self.stamps: list[str] = []
         self.texts: dict[str, list[str]] = {name: [] for name in _QUANTITIES}
-        self._path: list[str] = []
+        self.path = [*path]
         self._is_normal = False
         self._text: list[str] | None = None
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         name = tag.rpartition(":")[2]
-        self._path.append(name)
-        if len(self._path) > _DEEPEST:
+        self.path.append(name)
+        if len(self.path) > _DEEPEST:
             raise DataError(f"expected MVNX of at most {_DEEPEST} elements within each other, got more")
         if name == "subject":
-            self.rate = attributes.get("frameRate", "")
-        elif name in self.names and self._path[-2:-1] == [f"{name}s"]:
+            self.rate, self.label = attributes.get("frameRate", ""), attributes.get("label", "")
+        elif name in self.names and self.path[-2:-1] == [f"{name}s"]:
             self.names[name].append(attributes.get("label", f"{name} {len(self.names[name]) + 1}"))
             if len(self.names[name]) > _MOST:
                 raise DataError(f"expected at most {_MOST:,} {name}s in MVNX, got more")
@@ -68,11 +70,11 @@ class _Content:
             self._is_normal = attributes.get("type", "normal") == "normal"
             if self._is_normal:
                 self.stamps.append(attributes.get("time", ""))
-        elif self._is_normal and name in _QUANTITIES and self._path[-2:-1] == ["frame"]:
+        elif self._is_normal and name in _QUANTITIES and self.path[-2:-1] == ["frame"]:
             self._text = []
 
     def end(self, tag: str) -> None:
-        name = self._path.pop()
+        name = self.path.pop()
         if self._text is not None and name in _QUANTITIES:
             texts = self.texts[name]
             texts += [""] * (len(self.stamps) - 1 - len(texts))  # frames before that lack it
@@ -89,10 +91,36 @@ class _Content:
 def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """Read an MVNX file: ``Pelvis.position.x``, ``Pelvis.orientation.w``; angles where there are no segments."""
     check_expanded(3 * len(data))
-    content = _parsed(data)
-    count = len(content.stamps)
-    if not count:
+    subjects = [content for content in _parsed(data) if content.stamps]
+    if not subjects:
         raise DataError("expected frames of type 'normal' in an MVNX file, got none")
+    heads, units, columns, faults = _columns(subjects[0])
+    parts = [columns]
+    offsets = np.cumsum([0, *(len(content.stamps) for content in subjects)])
+    for content, first in zip(subjects[1:], offsets[1:].tolist(), strict=False):
+        names, _, more, wrong = _columns(content)
+        if names != heads:
+            raise DataError(
+                "expected the same segments and joints of all subjects of an MVNX file, got others of "
+                f"{content.label!r} than of {subjects[0].label!r}; export each to a file of its own"
+            )
+        parts.append(more)
+        faults |= {first + row: reason for row, reason in wrong.items()}
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    places = distinct([content.label or "subject" for content in subjects])
+    several = Segments(offsets, [*places], [None] * len(places)) if len(places) > 1 else None
+    roles = choose_roles(heads, ("number",) * len(heads), layout)
+    segments = tuple(k for k in roles.positions if ".angle." not in heads[k])
+    if layout.coordinates is None and segments:
+        others = tuple(k for k in roles.positions if k not in {*segments})
+        roles = roles._replace(positions=segments, ignored=(*roles.ignored, *others))
+    n_rows = int(offsets[-1])
+    return Table(tuple(heads), columns, n_rows, no_lines, faults, None, units, several, "Xsens"), roles
+
+
+def _columns(content: _Content) -> tuple[list[str], list[str], list[Any], dict[int, str]]:
+    """Return heads, units and values of the columns of a subject, and what is wrong in which frame."""
+    count = len(content.stamps)
     heads, units, columns, faults = [STAMP], ["s"], [_times(content)], dict[int, str]()
     for name, (kind, ends, unit) in _QUANTITIES.items():
         owners = content.names[kind]
@@ -109,23 +137,24 @@ def read_mvnx_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         columns += [*values.T]
     if len(heads) == 1:
         raise DataError(f"expected {', '.join(_QUANTITIES)} in the frames of an MVNX file, got none of them")
-    roles = choose_roles(heads, ("number",) * len(heads), layout)
-    segments = tuple(k for k in roles.positions if ".angle." not in heads[k])
-    if layout.coordinates is None and segments:
-        others = tuple(k for k in roles.positions if k not in {*segments})
-        roles = roles._replace(positions=segments, ignored=(*roles.ignored, *others))
-    return Table(tuple(heads), columns, count, no_lines, faults, measured_in=units, maker="Xsens"), roles
+    return heads, units, columns, faults
 
 
-def _parsed(data: bytes) -> _Content:
-    content, parser = _Content(), expat.ParserCreate()
+def _parsed(data: bytes) -> list[_Content]:
+    contents, parser = [_Content()], expat.ParserCreate()
     parser.buffer_text = True
-    parser.StartElementHandler, parser.EndElementHandler = content.start, content.end
-    parser.CharacterDataHandler = content.characters
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if tag.rpartition(":")[2] == "subject" and any(contents[-1].names.values()):  # another one
+            contents.append(_Content(contents[-1].path))
+        contents[-1].start(tag, attributes)
+        parser.EndElementHandler, parser.CharacterDataHandler = contents[-1].end, contents[-1].characters
+
+    parser.StartElementHandler = start
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
     with damaged_as("expected an MVNX file, got something foreign, truncated or damaged", expat.ExpatError):
         parser.Parse(data, True)
-    return content
+    return contents
 
 
 def _refuse(*_: Any) -> None:

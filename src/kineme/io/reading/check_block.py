@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -58,7 +59,9 @@ def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str])
             problems.append(_problem(block, file, i, first, (int(n_odd[i]), skip)))
         block = _keep(block, ~odd) if skip == "sample" else take_movements(block, n_odd == 0)
     if np.isnan(block.positions).any():
-        block, lacking = _without_missing(fill_gaps(block, columns, layout), file, skip, columns)
+        filled = fill_gaps(replace(block, times=block.stamps), columns, layout)
+        timed, (block, lacking) = block.times is not None, _without_missing(filled, file, skip, columns)
+        block = block if timed else replace(block, times=None)
         problems += lacking
     lengths = np.diff(block.offsets)
     for i in np.flatnonzero(lengths < MIN_SAMPLES).tolist():
@@ -93,7 +96,7 @@ def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str])
 
 
 def _unusable(block: Block, skip: str) -> Flags:
-    """Mark samples out of range, or not later than the sample before; if samples are dropped, than all kept before."""
+    """Mark samples out of range, or not later than the sample before; if samples are dropped, the fewest of these."""
     total = len(block.positions)
     odd: Flags = np.asarray((np.abs(block.positions) > LARGEST_POSITION).any(axis=1))  # what is missing comes later
     if block.faults:
@@ -105,14 +108,27 @@ def _unusable(block: Block, skip: str) -> Flags:
     step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
     late = ~(step >= SHORTEST_STEP)
     if skip == "sample" and (odd | late).any():
-        # Samples not later than all usable ones before them, in the movements that have a fault.
         for i in np.unique(np.searchsorted(block.offsets, np.flatnonzero(odd | late), side="right") - 1):
             rows = slice(block.offsets[i], block.offsets[i + 1])
-            usable = np.where(odd[rows], -np.inf, block.times[rows])
-            before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
-            with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
-                late[rows] = ~(usable - before >= SHORTEST_STEP)
+            late[rows] = ~_increasing(block.times[rows], ~odd[rows])
     return odd | late
+
+
+def _increasing(times: Array, usable: Flags) -> Flags:
+    """Mark as many usable stamps as increase one after the other, the earlier one of two that are equal."""
+    ends, last, before = list[float](), list[int](), np.full(len(times), -1)  # per length the run that ends earliest
+    for k in np.flatnonzero(usable).tolist():
+        t = float(times[k])
+        n = bisect_right(ends, t - SHORTEST_STEP)
+        n -= n > 0 and t - ends[n - 1] < SHORTEST_STEP  # rounded
+        before[k] = last[n - 1] if n else -1
+        if n == len(ends) or t < ends[n]:
+            ends[n : n + 1], last[n : n + 1] = [t], [k]
+    marked: Flags = np.zeros(len(times), dtype=bool)
+    k = last[-1] if last else -1
+    while k >= 0:
+        marked[k], k = True, int(before[k])
+    return marked
 
 
 def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> Problem:
@@ -144,6 +160,10 @@ def _reason(block: Block, i: int, k: int, skip: str) -> str:
         return f"expected finite times, got {times[k]}{at}"
     if abs(times[k]) > LARGEST_STAMP:
         return f"expected times up to {LARGEST_STAMP:g} s, got {times[k]:.9g}{at}"
+    first, end = block.offsets[i], block.offsets[i + 1]
+    if k == first or times[k] - times[k - 1] >= SHORTEST_STEP:  # this one is too late: the next ones are before it
+        k += 1 + int(np.argmax(times[k + 1 : end] - times[k] < SHORTEST_STEP))
+        at = f" at sample {k - first}"
     before = times[k - 1]
     if before < times[k]:
         return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"

@@ -150,7 +150,7 @@ def merge_files(files: Sequence[FileRead], where: str, layout: Layout, problems:
     detected = Counter(understood[file.path] for file in full).most_common()
     blocks = [file.block for file in full]
     positions = _concatenated([block.positions for block in blocks])
-    times = _concatenated([_stamps(block) for block in blocks])
+    times = _concatenated([block.stamps for block in blocks])
     demonstrations = demonstrations_of(positions, times, _offsets_of(blocks), sources, channels)
     taken = [how.columns for how, _ in detected if layout.by_number and how.named]
     notes = (
@@ -181,7 +181,7 @@ def _without_unclear_times(files: Sequence[FileRead]) -> list[FileRead]:
     if len({how.units for how in guessed.values()}) > 1:
         for file in files:
             if (how := guessed.get(file.path)) is not None:
-                step = float(np.median(np.abs(np.diff(_stamps(file.block)))) / float(UNITS[str(how.units)].size))
+                step = float(np.median(np.abs(np.diff(file.block.stamps))) / float(UNITS[str(how.units)].size))
                 steps.setdefault(str(how.time), {}).setdefault(how.units, []).append(step)
     reasons = {}
     for head, by_unit in steps.items():
@@ -222,15 +222,6 @@ def _offsets_of(blocks: Sequence[Block]) -> NDArray[np.intp]:
 
 def _concatenated(arrays: Sequence[Any]) -> Any:
     return np.ascontiguousarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays))
-
-
-def _stamps(block: Block) -> Any:
-    """Return time stamps; if a file has none, even ones over one second."""
-    if block.times is not None:
-        return block.times
-    lengths = np.diff(block.offsets)
-    within = np.arange(len(block.positions)) - np.repeat(block.offsets[:-1], lengths)
-    return within / np.repeat(lengths - 1, lengths)
 
 
 def with_channels(files: Sequence[FileRead], layout: Layout) -> tuple[list[FileRead], Channels | None, list[Problem]]:

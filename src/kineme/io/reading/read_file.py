@@ -101,7 +101,9 @@ def parsed_file(parse: Callable[[Layout], Parsed], form: Format, relative: Path,
             if layout.rows and not form.has_lines:
                 raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
             parsed = select_columns(parse, layout)
-            detected, block, left_out, named_alone = parsed if layout.every is None else in_blocks(parsed, layout.every)
+            detected, block, left_out, named_alone, _ = (
+                parsed if layout.every is None else in_blocks(parsed, layout.every)
+            )
             block, sentinels = sentinels_as_missing(block, detected.columns)
             if layout.measured_in is not None:
                 detected = with_unit(detected, block, layout.measured_in, layout.kinds or {})
@@ -227,7 +229,8 @@ def _without_excluded(parsed: Parsed, layout: Layout) -> Parsed:
     """Return a file without the columns that are excluded or, unless they were chosen, hold nothing."""
     detected, block = parsed.detected, parsed.block
     heads = detected.columns
-    dropped = excluded_numbers(heads, layout.excluded)
+    by_name = [column for column in layout.excluded if isinstance(column, str) and not column.isdecimal()]
+    dropped = excluded_numbers(heads, by_name if parsed.without_excluded else layout.excluded)
     if layout.coordinates is None and len(block.positions):
         nothing = np.flatnonzero(np.isnan(block.positions[0]))
         dropped |= {*nothing[np.isnan(block.positions[:, nothing]).all(axis=0)].tolist()}

@@ -32,6 +32,7 @@ _NUMBER = re.compile(rf"{_DIGITS}|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _MEASURED = re.compile(rf"{_DIGITS}\s*(?P<unit>[^\s\d.,].*)")  # a number with its unit beside it: 12.3 mm
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d)")  # before an exponent, of double precision
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
+_BRACKETED = re.compile(r"^[\[(]\s*(.*?)\s*[\])]$")  # a unit; the brackets of m/(s^2) are its own
 _STAMP = re.compile(r"\d+([:/.-])\d+\1\d+")  # digits of a date or of a time of day
 _SEPARATOR_LINE = re.compile(r'"?sep=.{0,2}', re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
@@ -142,7 +143,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     numbers = [str(k) for k in range(len(cells[0]))]  # above fractions, as data frames without heads are written
     numbered = not named and cells[0] == numbers and any("." in cell for cell in cells[-1])
     first += numbered
-    units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
+    units = _units_below(cells[0], cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
     if units:
         units, first = (*units, *[""] * (len(cells[0]) - len(units))), rows[1] + 1
     body = cells[named + bool(units) or numbered :]
@@ -162,36 +163,58 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     }
     kinds = tuple("flag" if k in flags else kind for k, kind in enumerate(kinds))
     if heads:
-        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, tuple(map(text_in, units)))
     names = tuple(f"column {k}" for k in range(len(kinds)))
     return Dialect(separator, comma, names, False, first, kinds)
 
 
 def _n_heads(cells: Sequence[list[str]], comma: bool) -> int:
     """Count the lines of heads: several where a name in the first stands above several columns, as of points."""
-    top = [cell for cell in cells[0] if cell]
-    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) for cell in row)), 1)
-    alike = len({len(row) for row in cells[:lines]}) == 1 and len({*top}) < len(top)
-    return lines if 1 < lines <= _MOST_HEADS and alike and not any(map(units_in, cells[1:lines])) else 1
+    lines = next((k for k, row in enumerate(cells) if any(is_number(cell, comma) or is_date(cell) for cell in row)), 1)
+    lines -= lines > 1 and bool(units_in(cells[lines - 1]))
+    if not 1 < lines <= _MOST_HEADS or len({len(row) for row in cells[:lines]}) > 1:
+        return 1
+    top = [cell for cell in _filled(cells[:lines])[0] if cell]
+    return lines if len({*top}) < len(top) and not any(map(units_in, cells[1:lines])) else 1
+
+
+def _filled(rows: Sequence[list[str]]) -> list[list[str]]:
+    """Return lines of heads with a name also above the columns to the right that it stands for, whose cells are empty.
+
+    It ends where one above it does, and stands for no column without a name below; the first column is none of them.
+    """
+    filled = [list(row) for row in rows]
+    for i, row in enumerate(filled[:-1]):
+        for k in range(2, len(row)):
+            goes_on = i == 0 or filled[i - 1][k] == filled[i - 1][k - 1]
+            if not row[k] and goes_on and any(below[k] for below in rows[i + 1 :]):
+                row[k] = row[k - 1]
+    return filled
 
 
 def _joined(rows: Sequence[list[str]]) -> list[str]:
     """Return lines of heads as one: ``nose`` above ``x`` is nose.x. DeepLabCut's line of the scorer is left out."""
     if len(rows) == 1:
         return rows[0]
-    names = [row[1:] for row in rows if row[0] != "scorer"]
+    names = [row[1:] for row in _filled(rows) if row[0] != "scorer"]
     first = next((row[0] for row in reversed(rows) if row[0]), "")
     heads = (".".join(filter(None, cells)) for cells in zip(*names, strict=True))
     return ["frame" if first == "coords" else first, *heads]
 
 
-def units_in(cells: Sequence[str]) -> tuple[str, ...]:
-    """Return the units in a row that holds nothing but units, without brackets; empty if it is no such row."""
-    plain = tuple(cell.strip("[]() ") for cell in cells)
+def _units_below(heads: Sequence[str], cells: Sequence[str]) -> tuple[str, ...]:
+    """Return the units in a row below heads that all differ, also beside words that are no units to us: ``%MVC``."""
+    words = len({*heads}) == len(heads) and not any(is_number(cell, True) or is_date(cell) for cell in cells)
+    return units_in(cells, words)
+
+
+def units_in(cells: Sequence[str], words: bool = False) -> tuple[str, ...]:
+    """Return the units in a row of nothing but units, without brackets, or of `words` beside them; else nothing."""
+    plain = tuple(_BRACKETED.sub(r"\1", cell.strip()) for cell in cells)
     letters = [cell.lower() in _LETTERS for cell in plain]
     n_units = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
     others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
-    return plain if n_units and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
+    return plain if n_units and (words or not others) and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 
 def _below_preamble(lines: Sequence[str], own: list[int], cells: Sequence[list[str]]) -> list[int]:

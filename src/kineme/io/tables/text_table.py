@@ -29,7 +29,7 @@ from kineme.io.tables.dialect import (
     numbers_in,
     split,
 )
-from kineme.movements.tables.columns import Roles, choose_roles, may_count
+from kineme.movements.tables.columns import Roles, choose_roles, may_count, with_times_that_increase
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import FLAGS, Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
@@ -52,7 +52,7 @@ _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
 _MAKERS = (
     export_heads.optitrack_head, export_heads.vicon_head, export_heads.qualisys_head, export_heads.trc_head,
-    export_heads.opensim_head,
+    export_heads.opensim_head, export_heads.empatica_head,
 )  # fmt: skip
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
@@ -137,6 +137,8 @@ def _roles_and_rows(
         roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named, values)
     if counters & {*roles.positions}:
         rows, faults = _rows(data, encoding, dialect, texts | counters - {*roles.positions})
+    if roles.time is not None and not (dialect.named or dated or layout.time is not None):
+        roles = with_times_that_increase(roles, rows[f"c{roles.time}"], layout)
     return dialect, roles, rows, faults
 
 
@@ -256,6 +258,8 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
     """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
     head, dialect = export
+    if not head.is_timed and isinstance(layout.units, float | int):
+        head = head._replace(rate=None)  # the step that the caller says wins
     data = data.replace(b",", b"\t") if head.packed else data
     _check_memory(data, dialect)
     more = head.rate is not None and not head.is_timed  # a column of the times that follow from the rate
@@ -276,7 +280,7 @@ def _with_times_and_gaps(head: ExportHead, names: Sequence[str], columns: list[A
         frames, parts = counted.get("frame"), counted.get("sub frame")
         if frames is None or (parts is not None and parts.any()):  # frames are divided or not counted
             frames = np.arange(len(columns[0]))
-        columns = [*columns, (frames - frames[0]) / head.rate]
+        columns = [*columns, head.start + (frames - frames[0]) / head.rate]
     elif head.rate is not None and "frame" in head.heads:
         k, frames = head.heads.index(export_heads.STAMP), columns[head.heads.index("frame")]
         even = columns[k][0] + (frames - frames[0]) / head.rate

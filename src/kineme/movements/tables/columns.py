@@ -54,6 +54,7 @@ _DERIVATIVE_WORDS = frozenset(
 _CONFIDENCE_WORDS = frozenset({"confidence", "conf", "likelihood", "score", "visibility", "presence", "residual"})
 _STATES = frozenset({"state", "status"})  # the same where names end in them: HandRight_TrackingState
 _ALONE = ({"confidence"}, {"likelihood"}, {"status"})  # that are of all points where no name stands beside them
+_MOSTLY = 0.75  # of its steps, by which a column of times increases, though some are faulty
 _AXES = frozenset("xyz")
 _BESIDE_AZ = ("el", "elevation", "x", "y", "ax", "ay")  # what tells an azimuth from an acceleration along z
 
@@ -69,6 +70,7 @@ class Roles(NamedTuple):
     nanoseconds: int | None = None  # added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``
     person: int | None = None  # one of those in `movement`
     clocks: tuple[int, ...] = ()  # other columns of times, which have to show the same clock
+    apart: tuple[int, ...] = ()  # times of other clocks that part the coordinates, which have to run at the same rate
 
 
 DISCRETE_WORDS = frozenset(
@@ -111,20 +113,11 @@ def choose_roles(
         if kinds[k] == "flag" and (layout.coordinates is not None or DISCRETE_WORDS & {*words_of(head)})
     }
     free = [k for k in range(len(heads)) if k not in taken and (kinds[k] == "number" or k in steps)]
+    clocks = {k for k in free if time is not None and _is_another_clock(heads[k], heads[time])}
     if layout.coordinates is not None:
         positions = column_numbers(heads, layout.coordinates, free)
     else:
         plain = set(map(_plain, heads))
-        clocks = {
-            k
-            for k in free
-            if time is not None
-            and (
-                _is_clock(heads[k])
-                or (is_time(heads[time]) and _is_stamp(heads[k]))
-                or (split_head(heads[k])[1] or "").lower() in TIME_UNITS
-            )
-        }
         derived = beside_positions([heads[k] for k in free]) if named else set()
         counters = _counters(heads, free, values, (time, *movement, label))
         positions = tuple(
@@ -137,10 +130,39 @@ def choose_roles(
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] in ("text", "flag")]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
-    used = {time, nanoseconds, label, *others, *movement, *positions}
+    # Where coordinates stand both between the times and another clock and elsewhere, each sensor may have its own.
+    between = {k: sum(min(k, time) < p < max(k, time) for p in positions) for k in clocks if time is not None}
+    apart = tuple(k for k, n in between.items() if 0 < n < len(positions) and k not in positions)
+    used = {time, nanoseconds, label, *others, *movement, *positions, *apart}
     ignored = tuple(k for k in range(len(heads)) if k not in used)
     beside_time = tuple(k for k in others if k is not None and k not in positions)
-    return Roles(time, positions, movement, label, ignored, nanoseconds, person, beside_time)
+    return Roles(time, positions, movement, label, ignored, nanoseconds, person, beside_time, apart)
+
+
+def with_times_that_increase(roles: Roles, stamps: Any, layout: Layout) -> Roles:
+    """Take a column for times that nobody named so only if it increases, where `units` may be the step without one."""
+    k, stamps = roles.time, stamps[np.isfinite(stamps)]
+    assert k is not None
+    steps = np.diff(stamps)
+    increases = len(steps) == 0 or np.mean(steps > 0) > _MOSTLY
+    is_step = isinstance(layout.units, float | int)
+    if increases and is_step and (stamps != np.rint(stamps)).any():
+        raise DataError(
+            f"expected to know whether units={layout.units:g} is the unit of times or the step between samples, "
+            f"got numbers with fractions that increase in column {k}; say time={k} if they are times, else columns= "
+            f"with {k} among them or exclude={k}, in the shell --time, --columns, --exclude"
+        )
+    if increases:
+        return roles
+    if not is_step:
+        raise DataError(
+            f"expected times in column {k}, since the table has no heads, got numbers that do not increase; say which "
+            "has them with time=, or the step between samples with units= where there are none, in the shell --time, "
+            "--units"
+        )
+    if layout.coordinates is not None:
+        return roles._replace(time=None, ignored=(*roles.ignored, k))
+    return roles._replace(time=None, positions=tuple(sorted((k, *roles.positions))))
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
@@ -301,6 +323,16 @@ def _is_clock(head: str) -> bool:
     """Tell whether a head names the time of another clock: ``ros_time``, ``sensor_timestamp_ns``."""
     words = [word for word in words_of(split_head(head)[0]) if word not in TIME_UNITS | _BEGINS]
     return len(words) > 1 and words[-1] in _STAMPS
+
+
+def _is_another_clock(head: str, time: str) -> bool:
+    """Tell whether a head names the time of another clock than that of `time`: ``time_acc`` beside ``time_emg``."""
+    first, alike = words_of(head)[:1], words_of(time)[:1]
+    return (
+        _is_clock(head)
+        or (_is_stamp(head) if is_time(time) else first == alike and not TIME_WORDS.isdisjoint(first))
+        or (split_head(head)[1] or "").lower() in TIME_UNITS
+    )
 
 
 def is_header_stamp(head: str) -> bool:

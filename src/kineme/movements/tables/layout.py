@@ -182,6 +182,15 @@ class Block:
     people: list[str | None] | None = None  # who showed each movement
     repairs: list[Repair] | None = None  # what was done about missing values
 
+    @property
+    def stamps(self) -> Array:
+        """The time stamps; if the file has none, even ones over one second."""
+        if self.times is not None:
+            return self.times
+        lengths = np.diff(self.offsets)
+        within = np.arange(len(self.positions)) - np.repeat(self.offsets[:-1], lengths)
+        return within / np.repeat(np.maximum(lengths - 1, 1), lengths)
+
     def row(self, k: int) -> int:
         """Row of the file that sample k comes from."""
         return k if self.rows is None else int(self.rows[k])
@@ -196,6 +205,8 @@ class Parsed(NamedTuple):
     left_out: tuple[str, ...] = ()
     # Whether its label is no more than the name of its one array or group: a folder says better what it is.
     named_alone: bool = False
+    # Whether the columns that are excluded by their numbers in the file are left out already.
+    without_excluded: bool = False
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:

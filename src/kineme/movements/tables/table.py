@@ -16,13 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import DISCRETE_WORDS, Roles, choose_roles, counts_samples, no_time
+from kineme.movements.tables.columns import (
+    DISCRETE_WORDS,
+    Roles,
+    choose_roles,
+    counts_samples,
+    excluded_numbers,
+    no_time,
+)
 from kineme.movements.tables.layout import Block, Detected, Layout, Parsed, distinct, listed, no_lines
 from kineme.movements.tables.time_stamps import (
     PER_SECOND,
     in_seconds,
     nanoseconds,
     same_clock,
+    same_rate,
     seconds_of_dates,
     unit_by_size,
     unit_in_head,
@@ -87,6 +95,17 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
             same_clock(times, in_seconds(table.columns[k], unit)) for unit in ([named] if named else PER_SECOND)
         ):
             raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
+    for k in roles.apart:
+        named = _unit_of_times(table, k)
+        if not any(same_rate(times, in_seconds(table.columns[k], unit)) for unit in ([named] if named else PER_SECOND)):
+            head = table.heads[k]
+            own = head if table.heads.count(head) == 1 else k
+            raise DataError(
+                f"expected samples at the times of one clock, got {head!r} in column {k}, which runs at another rate: "
+                "beside it are values of other moments; say which are of one clock with columns=, in the shell "
+                "--columns, or save each sensor in a file of its own and say join_files=True, in the shell "
+                f"--join-files; if all of a row is of one moment, exclude={own!r}, in the shell --exclude"
+            )
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
     told_by = [table.heads[k] for k in (*roles.movement, roles.label) if k is not None]
@@ -115,14 +134,16 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         units_from,
         tuple(heads[k] for k in roles.movement),
         () if roles.label is None else (heads[roles.label],),
-        tuple(heads[k] for k in sorted((*roles.ignored, *roles.clocks))),
+        tuple(heads[k] for k in sorted((*roles.ignored, *roles.clocks, *roles.apart))),
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
         in_blocks=_in_blocks(table, roles, codes, rows),
         notes=_note_on_turns(table, roles, positions, codes, rows),
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
-    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+    block = Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people)
+    excluded = excluded_numbers(heads, layout.excluded)
+    return Parsed(detected, block, without_excluded=bool(excluded) and excluded.isdisjoint(roles.positions))
 
 
 def _without_counted(table: Table, roles: Roles) -> Roles:
@@ -343,7 +364,12 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     columns: list[Any] = list(arrays)
     for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
         columns[k] = _texts(arrays[k].tolist())
-    for k in (*roles.positions, *roles.clocks, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
+    for k in (
+        *roles.positions,
+        *roles.clocks,
+        *roles.apart,
+        *(() if roles.nanoseconds is None else (roles.nanoseconds,)),
+    ):
         columns[k] = _numbers(heads[k], arrays[k])
         if k in roles.positions and (integer := too_long_integer(arrays[k])) is not None:
             raise DataError(f"expected numbers in the column {heads[k]!r} that floats can hold, got {integer}{ROUNDED}")

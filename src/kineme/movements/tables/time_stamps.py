@@ -27,7 +27,8 @@ _WORDS = re.compile(
     r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+"
 )
 
-_UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds since 1970
+#: The years 2000 to 2100, in seconds since 1970.
+UNIX = (946_684_800.0, 4_102_444_800.0)
 
 #: Shortest step between samples, in units of the stamps, at which they are taken to be in that unit. Movements are not
 #: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
@@ -40,6 +41,8 @@ _TICK_WORDS = frozenset({"tick", "ticks"})
 _SLOW_IN_US = 2e5  # five samples a second, or fifty if they are ticks of 100 ns, as a camera with depth writes them
 _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
+_RATE, _STEPS_APART = 1e-3, 3  # of the time that passed, and steps, by which clocks of one rate differ in the end
+_RUNNING = 0.9  # of the steps of a clock, at least, go forward
 
 _DATE = re.compile(r"\d{4}([-/])\d\d\1\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
 _CLOCK = r"(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d([.,]\d+)?)"
@@ -98,7 +101,7 @@ def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
     step = float(np.median(steps)) if len(steps) else 0.0
     of_date = {*words_of(head)} & _DATE_WORDS
     for (unit, per_second), finer in zip(PER_SECOND.items(), [*PER_SECOND, ""][1:], strict=True):
-        if not _UNIX[0] <= finite[0] / per_second <= _UNIX[1] or (step / per_second >= _LONGEST and not of_date):
+        if not UNIX[0] <= finite[0] / per_second <= UNIX[1] or (step / per_second >= _LONGEST and not of_date):
             continue
         if finer and step / per_second >= 1.0 and not of_date:
             raise DataError(
@@ -127,6 +130,20 @@ def same_clock(times: Array, others: Array) -> bool:
     a, b = (each[both] - each[both][:1] for each in (times, others))
     step = float(np.median(np.abs(np.diff(a)))) if len(a) > 1 else 0.0
     return bool((np.abs(a - b) <= 0.5 * step + _DRIFT * np.abs(a)).all())
+
+
+def same_rate(times: Array, others: Array) -> bool:
+    """Tell whether two columns of times [s] (total,) run alike but for a few steps; true of one that often stands.
+
+    Steps back, as where another movement begins, and missing stamps do not count.
+    """
+    both = np.isfinite(times) & np.isfinite(others)
+    a, b = (np.diff(each[both]) for each in (times, others))
+    if not len(b) or np.mean(b > 0) < _RUNNING:
+        return True
+    on = (a >= 0) & (b >= 0)
+    passed, n_steps = float(a[on].sum()), max(1, int(np.count_nonzero(on)))
+    return abs(passed - float(b[on].sum())) <= (_STEPS_APART / n_steps + _RATE) * passed
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
