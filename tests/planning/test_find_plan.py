@@ -110,6 +110,7 @@ def test_a_goal_that_cannot_be_reached_says_what_is_missing(domain, changes, goa
         "(sweet tea)",
         "(and)",
         "(not)",
+        "(not (and (sweet cup) (sweet mug)))",
     ],
 )
 def test_a_goal_in_other_words_is_refused(domain, goal):
@@ -187,6 +188,7 @@ def test_changes_that_fit_no_operator_are_refused(domain):
     for wrong, message in (
         (text.replace("(sweet ?at)", "(sweet ?cup)"), "expected parameters of"),
         (text + ")", "without its"),
+        (text.replace("(sweet ?at)", "(not (and (sweet ?at) (spoon_full)))"), "expected not of one literal"),
         ("(define (problem x))", "expected .define .domain"),
         ("(" * 500 + ")" * 500, "deep"),
     ):

@@ -185,7 +185,13 @@ def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
     if isinstance(expression, list) and expression and expression[0] == "and":
         return [literal for part in expression[1:] for literal in literals_of(part)]
     if isinstance(expression, list) and len(expression) == 2 and expression[0] == "not":
-        return [(words, not value) for words, value in literals_of(expression[1])]
+        within = literals_of(expression[1])
+        if len(within) != 1:  # of several, at least one is false, and nothing says which
+            raise DataError(
+                f"expected not of one literal, as (not (full cup)), got it of {len(within)}; write (not ...) around "
+                "each that is to be false"
+            )
+        return [(words, not value) for words, value in within]
     if not (isinstance(expression, list) and expression and all(isinstance(word, str) for word in expression)):
         raise DataError(f"expected literals and their conjunctions, as (and (in cup shelf)), got {expression!r:.100}")
     return [(tuple(expression), True)]
