@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from kineme.errors import DataError, SpecificationError
 from kineme.planning import Edit, Literal, domain_from_dict, domain_to_dict, edited
-from kineme.planning.domain import is_shown, operator_schema
+from kineme.planning.domain import is_shown, operator_schema, unmade
 from kineme.planning.operators import operators_of
 from kineme.planning.states import States
 from kineme.planning.vocabulary import vocabulary_of
@@ -189,6 +189,20 @@ def test_edits_are_made_in_their_order_and_the_last_one_counts(order, last):
     literal = Literal("sweet", ("at",))
     edits = [Edit("scoop", "effect", literal, k % 2 == 0) for k in order] + [Edit("scoop", "effect", literal, last)]
     assert ("(sweet ?at)" in tea.literals(edited(domain, edits).operator("scoop"))[1]) == last
+
+
+def test_edits_follow_their_symbol_whatever_it_is_called():
+    states, edit = tea.states(2), Edit("stir", "effect", Literal("served", ("at",)), True)
+    before = operators_of(states, np.ones(len(states)), {"stir": "sym-1", "scoop": "sym-2"}, edits=[edit])
+    data = domain_to_dict(before)
+    del data["edits"][0]["symbol_id"]  # as files had it before
+    edits = domain_from_dict(data).edits
+    assert edits == before.edits == (edit._replace(symbol_id="sym-1"),)
+    after = operators_of(states, np.ones(len(states)), {"scoop": "sym-1", "stir": "sym-2"}, edits=edits)
+    served = ["(served ?at)" in tea.literals(after.operator(name))[1] for name in ("scoop", "stir")]
+    assert (served, unmade(after)) == ([True, False], [])
+    gone = operators_of(states, np.ones(len(states)), {"scoop": "sym-3", "stir": "sym-2"}, edits=edits)
+    assert unmade(gone) == [*gone.edits] == [*edits]
 
 
 def test_wrong_options_are_refused():

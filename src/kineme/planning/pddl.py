@@ -249,8 +249,16 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
                 )
             if both := next((each for each in present if each._replace(value=not each.value) in present), None):
                 raise DataError(f"expected {both} of {operator.name} true or false in its {part}, got both")
-            edits += [Edit(operator.name, part, literal, True) for literal in present if literal not in learned]
-            edits += [Edit(operator.name, part, literal, False) for literal in learned if literal not in present]
+            edits += [
+                Edit(operator.name, part, literal, True, operator.symbol_id)
+                for literal in present
+                if literal not in learned
+            ]
+            edits += [
+                Edit(operator.name, part, literal, False, operator.symbol_id)
+                for literal in learned
+                if literal not in present
+            ]
     return edits
 
 
