@@ -185,7 +185,9 @@ def test_a_goal_without_its_parentheses_is_refused_with_an_example(domain, goal,
 
 def test_changes_that_fit_no_operator_are_refused(domain):
     text = domain_to_pddl(domain)
+    other = edited(domain, [Edit("stir", "effect", Literal("served", ("at",)), True)])
     for wrong, message in (
+        (domain_to_pddl(other), "expected the PDDL and the JSON of one call"),
         (text.replace("(sweet ?at)", "(sweet ?cup)"), "expected parameters of"),
         (text + ")", "without its"),
         (text.replace("(sweet ?at)", "(not (and (sweet ?at) (spoon_full)))"), "expected not of one literal"),

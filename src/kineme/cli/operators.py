@@ -84,13 +84,17 @@ def edits_of(path: Path, ids: set[str] | None = None) -> list[Any]:
     Where none of its symbols is among `ids`, those of a library, that one was built anew, and names count.
     """
     from kineme.planning.domain import read_domain
-    from kineme.planning.pddl import edits_in
+    from kineme.planning.pddl import edits_in, is_signed
 
     plain = path.with_suffix(".json")
     if not plain.is_file():
         return []
     domain = read_domain(plain)
-    changed = edits_in(path.read_text(encoding="utf-8"), domain) if path.suffix == ".pddl" and path.is_file() else []
+    text = path.read_text(encoding="utf-8") if path.suffix == ".pddl" and path.is_file() else None
+    changed = [] if text is None else edits_in(text, domain)
+    if text and changed and not is_signed(text):
+        write(f"note: all that differs from {printable(str(plain))} in {printable(str(path))} counts as changes of a "
+              "person, since it does not say of which operators it was written", err=True)  # fmt: skip
     edits = [*domain.edits, *changed]
     if edits and ids is not None and ids.isdisjoint(operator.symbol_id for operator in domain.operators):
         write("note: no symbol of the domain before is in this library; its edits go by the names of symbols", err=True)

@@ -6,9 +6,11 @@ operator is a static predicate over its parameters, ``(shown-carry ?from ?to ?it
 
 from __future__ import annotations
 
+import json
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
+from hashlib import sha256
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
@@ -22,6 +24,7 @@ _RESERVED = frozenset(
 )  # fmt: skip
 _LONGEST = 60  # characters of an identifier
 _MOST_TOKENS, _DEEPEST = 1_000_000, 200
+_DIGEST = re.compile(r"; of the operators ([0-9a-f]+)")
 _TOKEN = re.compile(r";[^\n]*|[()]|[^\s()]+")
 
 
@@ -72,6 +75,7 @@ def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
     usable = [operator for operator in domain.operators if operator.usable]
     predicates += [_typed(names.shown[each.name], [p.type for p in each.parameters]) for each in usable]
     lines = [
+        f"; of the operators {_digest(domain)}, by which the file beside it is known",
         f"(define (domain {identifiers([name])[name]})",
         "  (:requirements :strips :typing :negative-preconditions :action-costs)",
         "  (:types place item)",
@@ -83,6 +87,20 @@ def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
     for operator in domain.operators:
         lines += _action(operator, names) if operator.usable else _left_out(operator)
     return "\n".join([*lines, ")", ""])
+
+
+def _digest(domain: Domain) -> str:
+    """Return the digest of all that a person's changes are compared with."""
+    said = [
+        [each.name, each.usable, [parameter[:2] for parameter in each.parameters], each.preconditions, each.effects]
+        for each in domain.operators
+    ]
+    return sha256(json.dumps(said).encode()).hexdigest()[:16]
+
+
+def is_signed(text: str) -> bool:
+    """Tell whether a domain in PDDL says which operators it was written of; those of earlier versions do not."""
+    return _DIGEST.search(text) is not None
 
 
 def _typed(predicate: str, types: Iterable[str]) -> str:
@@ -216,8 +234,14 @@ def _sections(expression: Any, what: str) -> dict[str, list[Any]]:
 def edits_in(text: str, domain: Domain) -> list[Edit]:
     """Return a person's changes in the PDDL of a domain: what differs from what `domain_to_pddl` wrote of it.
 
-    Literals of preconditions and effects count; operators and predicates are told by their identifiers.
+    Literals of preconditions and effects count; operators and predicates are told by their identifiers. Raises
+    `DataError`: a text that was written of another domain, where what was learned since would count as a change.
     """
+    if (signed := _DIGEST.search(text)) and signed[1] != _digest(domain):
+        raise DataError(
+            "expected the PDDL and the JSON of one call of kineme operators, got those of two; restore the JSON of "
+            "this PDDL, or move the PDDL away, learn into it anew and make your changes again"
+        )
     names = Names(domain)
     sections = _sections(parsed(text), "domain").get(":action", [])
     actions = {part[0]: part[1:] for part in sections if part and isinstance(part[0], str)}
