@@ -85,6 +85,7 @@ def test_things_may_stand_elsewhere_within_what_was_shown(domain):
         ({}, "(sweet jar)", "(stir jar) was not shown so: at = jar is none of what was shown: cup, mug"),
         ({"hand_x": 3.0}, "(sweet cup)", "was not shown so: from = here-"),
         ({"spoon_full": None}, "(sweet cup)", "(spoon_full) is not known"),
+        ({"spoon_full": -1}, "(sweet cup)", "; spoon_full = -1 counts as not known: learned was 0, 1"),
         ({}, "(not (sweet cup))", None),
     ],
 )

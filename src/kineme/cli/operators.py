@@ -190,6 +190,8 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
         raise SpecificationError("expected the state now with --goal: give --state now.csv")
     else:
         task = problem_of(known, state, options["goal"])
+    for note in task.notes:
+        write(f"note: {note}", err=True)
     steps = find_plan(task, options["planner"], options["timeout"])
     follows = None if folder is None else _follow(folder, steps, options["plot"])
     data = plan_to_dict(steps) | {"written": [], "follows": follows}

@@ -242,7 +242,8 @@ def domain_from_dict(data: Any) -> Domain:
         vocabulary = _record(Vocabulary, words | {"variables": variables})
         for each in variables:
             n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
-            if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
+            two = (each.words, each.levels) if each.kind == "flag" else (each.levels,)
+            if len(each.columns) != n or any(len(values) not in (0, 2) for values in two):
                 raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
         records = (("parameters", Parameter), ("preconditions", Literal), ("effects", Literal), ("evidence", Evidence))
         operators = tuple(

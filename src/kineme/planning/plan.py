@@ -77,7 +77,9 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
         return Plan(problem, (), "no planner")
     shown = shown_arguments(problem)
     if missing := unreachable(problem, shown):
-        raise SpecificationError(f"expected a goal that operators reach within what was shown; {'; '.join(missing)}")
+        raise SpecificationError(
+            f"expected a goal that operators reach within what was shown; {_because(missing, problem)}"
+        )
     true = [fact for fact, value in problem.facts.items() if value]
     texts = (
         domain_to_pddl(problem.domain),
@@ -185,11 +187,15 @@ def check_plan(plan: Plan) -> None:
         )
         if reasons:
             raise SpecificationError(
-                f"expected steps that can be done, step {number} {step} cannot: {'; '.join(reasons)}"
+                f"expected steps that can be done, step {number} {step} cannot: {_because(reasons, plan.problem)}"
             )
         facts = facts_after(facts, operator, step.arguments)
     if missed := [str(goal) for goal in plan.problem.goal if facts.get(goal.fact) is not goal.value]:
         raise SpecificationError(f"expected a plan that reaches its goal, it misses {', '.join(missed)}")
+
+
+def _because(reasons: Sequence[str], problem: Problem) -> str:
+    return "; ".join((*reasons, *problem.notes))
 
 
 def plan_to_dict(plan: Plan) -> dict[str, Any]:
