@@ -255,8 +255,7 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
     predicate_of = {text: name for name, text in names.predicates.items()}
     edits = []
     for operator in usable:
-        action = actions[names.operators[operator.name]]
-        content = {action[k]: action[k + 1] for k in range(0, len(action) - 1, 2) if isinstance(action[k], str)}
+        content = _content(operator.name, actions[names.operators[operator.name]])
         for part, learned in (("precondition", operator.preconditions), ("effect", operator.effects)):
             expressions = [each for each in _conjuncts(content.get(f":{part}", ["and"])) if each[:1] != ["increase"]]
             present = [
@@ -286,6 +285,18 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
     return edits
 
 
+def _content(name: str, action: list[Any]) -> dict[str, Any]:
+    """Return keyword -> its expression, of an action; refuse what would leave out one of them."""
+    heads = action[::2]
+    if len(action) % 2 or any(str(head)[:1] != ":" or heads.count(head) > 1 for head in heads):
+        got = " ".join("(...)" if isinstance(word, list) else word for word in action)
+        raise DataError(
+            f"expected :parameters, :precondition and :effect of {name}, each once and with one expression, got "
+            f"{got:.100}; join several by (and ...)"
+        )
+    return dict(zip(heads, action[1::2], strict=True))
+
+
 def _conjuncts(expression: Any) -> list[Any]:
     if expression == []:  # an empty condition
         return []
@@ -295,8 +306,12 @@ def _conjuncts(expression: Any) -> list[Any]:
 def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tuple[tuple[str, ...], bool]]]:
     """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out."""
     sections = _sections(parsed(text), "problem")
+    if twice := next((name for name in (":objects", ":init", ":goal") if len(sections.get(name, [])) > 1), None):
+        raise DataError(f"expected one section {twice} in PDDL, got {len(sections[twice])}; join them")
     if not any(sections.get(":goal", [])):
         raise DataError("expected a problem with a goal, got none; add (:goal ...)")
+    if (n := len(sections[":goal"][0])) > 1:
+        raise DataError(f"expected one expression in :goal, got {n}; join them by (and ...)")
     words = sections.get(":objects", [[]])[0]
     objects, position = [], 0
     while position < len(words):  # a b - place c - item
