@@ -160,6 +160,7 @@ def test_names_that_differ_by_case_are_told_apart():
         ("(sweet ?at)\n", "(sweet)\n", r"expected \(sweet place\) in stir"),
         ("(sweet ?at)\n", "(spoon_full ?at)\n", r"expected \(spoon_full\) in stir"),
         ("(sweet ?at)\n", "(sweet ?at) (not (sweet ?at))\n", "got both"),
+        ("(not (hand-at ?to))  ;", "(not (= ?from ?to))  ;", "expected no = in the precondition of carry"),
         ("    :effect", "    :precondition (spoon_full)\n    :effect", "each once and with one expression, got :para"),
         ("    :effect", "    (spoon_full)\n    :effect", "each once and with one expression, got :para"),
     ],

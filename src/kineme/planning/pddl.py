@@ -265,6 +265,11 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
                 for words, value in literals_of(["and", *expressions])
                 if words[0] != names.shown[operator.name]
             ]
+            if any(literal.predicate == "=" for literal in present):
+                raise DataError(
+                    f"expected no = in the {part} of {operator.name}, got one; take it out, arguments are always "
+                    "different things"
+                )
             parameters = [parameter.name for parameter in operator.parameters]
             if unknown := next((literal for literal in present if {*literal.arguments} - {*parameters}), None):
                 raise DataError(
