@@ -221,7 +221,10 @@ HOSTILE = [
     "ö",
     "?from",
     "1",
+    "shown carry",
 ]
+#: Predicates that the parser of unified-planning takes for operators of PDDL.
+OPERATORS = ["always", "sometime", "sometime-after", "sometime-before", "at-most-once", "assign", "decrease"]
 
 
 def test_hostile_names_break_neither_pddl_nor_xml_nor_json(domain):
@@ -232,6 +235,8 @@ def test_hostile_names_break_neither_pddl_nor_xml_nor_json(domain):
     )
     hostile = edited(domain, ())
     hostile = type(domain)(domain.vocabulary, operators, domain.places)
+    edits = [Edit("carry", "precondition", Literal(name, (), False), True) for name in OPERATORS]
+    hostile = edited(hostile, edits)
     problem = PDDLReader().parse_problem_string(domain_to_pddl(hostile, ")(evil"))
     assert len(problem.actions) == len(HOSTILE)
     assert edits_in(domain_to_pddl(hostile), hostile) == []

@@ -20,7 +20,8 @@ from kineme.reporting.text import first_names, printable
 
 _RESERVED = frozenset(
     {"and", "or", "not", "imply", "exists", "forall", "when", "either", "object", "place", "item", "number", "define",
-     "total-cost", "increase", "minimize", "domain", "problem"}
+     "total-cost", "increase", "decrease", "assign", "minimize", "domain", "problem", "always", "sometime",
+     "sometime-after", "sometime-before", "at-most-once"}
 )  # fmt: skip
 _LONGEST = 60  # characters of an identifier
 _MOST_TOKENS, _DEEPEST = 1_000_000, 200
@@ -60,7 +61,10 @@ class Names:
         self.predicates = identifiers(self.types)
         self.operators = identifiers((operator.name for operator in domain.operators), self.predicates.values())
         prefix = "shown"
-        while any(text.startswith(f"{prefix}-") for text in self.predicates.values()):
+        own = {*self.operators.values()}
+        while any(text.startswith(f"{prefix}-") for text in self.predicates.values()) or any(
+            f"{prefix}-{text}" in own for text in own
+        ):
             prefix = f"was-{prefix}"
         self.shown = {name: f"{prefix}-{text}" for name, text in self.operators.items()}
         self.objects = identifiers(
