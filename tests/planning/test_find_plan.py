@@ -143,6 +143,9 @@ def test_a_problem_in_pddl_is_planned_where_things_were_shown(domain):
     text = f"""(define (problem two) (:domain tea) (:objects jar cup mug - place)
         (:init (hand-at place-1) (= (total-cost) 0)) (:goal {GOAL}))"""
     assert _makes_tea(find_plan(problem_from_pddl(domain, text)))
+    state = tea.now(spoon_full=1)  # of which the problem says otherwise
+    empty = problem_from_pddl(domain, text.replace("(= (", "(not (spoon_full)) (= ("), state)
+    assert empty.facts["spoon_full",] is False
     with pytest.raises(SpecificationError, match="whose position is known"):
         problem_from_pddl(domain, text.replace("mug - place", "mug glass - place"))
     with pytest.raises(DataError, match="goal"):

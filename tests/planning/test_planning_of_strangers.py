@@ -183,7 +183,9 @@ def test_an_empty_precondition_is_one():
     ("text", "message"),
     [
         ("(:init (sweet)) (:goal (sweet cup))", "expected facts in the words"),
-        ("(:init ()) (:goal (sweet cup))", "expected facts in :init"),
+        ("(:init ()) (:goal (sweet cup))", r"expected literals .*, got \(\)"),
+        ("(:init (at 5 (spoon_full))) (:goal (sweet cup))", r"expected literals .*, got \(at 5 \(spoon_full\)\)"),
+        ("(:init (spoon_full) (not (spoon_full))) (:goal (sweet cup))", "expected facts that hold together"),
         ("(:init) (:goal)", "with a goal"),
         ("(:objects (cup)) (:goal (sweet cup))", "names of objects"),
         ("(:init) (:goal (and (sweet cup) (not (sweet cup))))", "both true and false"),

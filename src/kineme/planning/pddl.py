@@ -23,6 +23,7 @@ _RESERVED = frozenset(
      "total-cost", "increase", "decrease", "assign", "minimize", "domain", "problem", "always", "sometime",
      "sometime-after", "sometime-before", "at-most-once"}
 )  # fmt: skip
+_Words = tuple[tuple[str, ...], bool]  # a literal: its words, and whether it is true
 _LONGEST = 60  # characters of an identifier
 _MOST_TOKENS, _DEEPEST = 1_000_000, 200
 _DIGEST = re.compile(r"; of the operators ([0-9a-f]+)")
@@ -202,7 +203,12 @@ def parsed(text: str) -> Any:
     return stack[0][0]
 
 
-def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
+def _plain(expression: Any) -> str:
+    """Return an expression as it was written."""
+    return f"({' '.join(map(_plain, expression))})" if isinstance(expression, list) else str(expression)
+
+
+def literals_of(expression: Any) -> list[_Words]:
     """Return the literals of a conjunction, as ``(and (in cup shelf) (not (full cup)))``: words, and whether true."""
     if isinstance(expression, list) and expression and expression[0] == "and":
         return [literal for part in expression[1:] for literal in literals_of(part)]
@@ -215,7 +221,9 @@ def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
             )
         return [(words, not value) for words, value in within]
     if not (isinstance(expression, list) and expression and all(isinstance(word, str) for word in expression)):
-        raise DataError(f"expected literals and their conjunctions, as (and (in cup shelf)), got {expression!r:.100}")
+        raise DataError(
+            f"expected literals and their conjunctions, as (and (in cup shelf)), got {_plain(expression):.100}"
+        )
     return [(tuple(expression), True)]
 
 
@@ -230,7 +238,7 @@ def _sections(expression: Any, what: str) -> dict[str, list[Any]]:
     sections: dict[str, list[Any]] = {}
     for part in expression[1:]:
         if not isinstance(part, list) or not part or not isinstance(part[0], str):
-            raise DataError(f"expected sections in parentheses in PDDL, got {part!r:.100}")
+            raise DataError(f"expected sections in parentheses in PDDL, got {_plain(part):.100}")
         sections.setdefault(part[0], []).append(part[1:])
     return sections
 
@@ -312,7 +320,7 @@ def _conjuncts(expression: Any) -> list[Any]:
     return expression[1:] if isinstance(expression, list) and expression[:1] == ["and"] else [expression]
 
 
-def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tuple[tuple[str, ...], bool]]]:
+def read_problem(text: str) -> tuple[list[str], list[_Words], list[_Words]]:
     """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out."""
     sections = _sections(parsed(text), "problem")
     if twice := next((name for name in (":objects", ":init", ":goal") if len(sections.get(name, [])) > 1), None):
@@ -329,12 +337,10 @@ def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tupl
         elif isinstance(words[position], str):
             objects.append(words[position])
         else:
-            raise DataError(f"expected names of objects in :objects, got {words[position]!r:.100}")
+            raise DataError(f"expected names of objects in :objects, got {_plain(words[position]):.100}")
         position += 1
-    init = [fact for fact in sections.get(":init", [[]])[0] if fact[:1] != ["="]]
-    if any(not isinstance(fact, list) or not fact or not all(isinstance(word, str) for word in fact) for fact in init):
-        raise DataError("expected facts in :init, as (in cup shelf), got something else")
-    return objects, [*map(tuple, init)], literals_of(sections[":goal"][0][0])
+    facts = literals_of(["and", *(fact for fact in sections.get(":init", [[]])[0] if fact[:1] != ["="])])
+    return objects, facts, literals_of(sections[":goal"][0][0])
 
 
 def name_of(identifier: str, identifier_of: Mapping[str, str], what: str) -> str:

@@ -94,10 +94,10 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     names = Names(domain, problem.objects)
     for identifier in objects:
         name_of(identifier, names.objects, "objects whose position is known (give the state)")
-    listed = {_fact_of(words, names) for words in facts if words[0] not in names.shown.values()}
-    _check_goals(problem, [Goal(fact) for fact in listed], "facts")
+    listed = [Goal(_fact_of(words, names), value) for words, value in facts if words[0] not in names.shown.values()]
+    _check_goals(problem, listed, "facts")
     known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
-    return replace(problem, facts=known | dict.fromkeys(listed, True), goal=_goals(problem, goals))
+    return replace(problem, facts=known | dict(listed), goal=_goals(problem, goals))
 
 
 def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dict[str, Array]:
@@ -143,7 +143,7 @@ def _check_goals(problem: Problem, goals: Sequence[Goal], what: str = "goals") -
             kinds = "nothing" if wanted is None else f"({' '.join((goal.fact[0], *wanted))})"
             raise SpecificationError(f"expected {what} in the words of the domain, here {kinds}, got {goal}")
     if both := next((goal for goal in goals if Goal(goal.fact, not goal.value) in goals), None):
-        raise SpecificationError(f"expected goals that hold together, got {both} both true and false")
+        raise SpecificationError(f"expected {what} that hold together, got {both} both true and false")
     if not goals and what == "goals":
         raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
 
