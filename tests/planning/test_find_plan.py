@@ -112,6 +112,7 @@ def test_a_goal_that_cannot_be_reached_says_what_is_missing(domain, changes, goa
         "(and)",
         "(not)",
         "(not (and (sweet cup) (sweet mug)))",
+        "(and (hand-at jar) (hand-at cup))",
     ],
 )
 def test_a_goal_in_other_words_is_refused(domain, goal):
@@ -139,6 +140,15 @@ def test_a_plan_survives_json_and_one_that_was_changed_is_refused(plan):
             plan_from_dict(changed)
 
 
+def test_all_that_is_tried_takes_the_time_to_plan_together(domain, monkeypatch):
+    shares = []
+    monkeypatch.setattr("kineme.planning.plan.monotonic", lambda: sum(shares))
+    monkeypatch.setattr("kineme.planning.plan._tried", lambda *task: shares.append(task[3]) or "none")
+    with pytest.raises(DataError, match="give more time"):
+        find_plan(problem_of(domain, tea.now(), GOAL), timeout=10)
+    assert shares == [5, 2.5, 2.5]
+
+
 def test_a_problem_in_pddl_is_planned_where_things_were_shown(domain):
     text = f"""(define (problem two) (:domain tea) (:objects jar cup mug - place)
         (:init (hand-at place-1) (= (total-cost) 0)) (:goal {GOAL}))"""
@@ -146,6 +156,7 @@ def test_a_problem_in_pddl_is_planned_where_things_were_shown(domain):
     state = tea.now(spoon_full=1)  # of which the problem says otherwise
     empty = problem_from_pddl(domain, text.replace("(= (", "(not (spoon_full)) (= ("), state)
     assert empty.facts["spoon_full",] is False
+    assert problem_from_pddl(domain, text.replace("place-1", "jar"), state).facts["hand-at", "place-1"] is False
     with pytest.raises(SpecificationError, match="whose position is known"):
         problem_from_pddl(domain, text.replace("mug - place", "mug glass - place"))
     with pytest.raises(DataError, match="goal"):

@@ -185,6 +185,10 @@ def test_an_empty_precondition_is_one():
         ("(:init (sweet)) (:goal (sweet cup))", "expected facts in the words"),
         ("(:init ()) (:goal (sweet cup))", r"expected literals .*, got \(\)"),
         ("(:init (at 5 (spoon_full))) (:goal (sweet cup))", r"expected literals .*, got \(at 5 \(spoon_full\)\)"),
+        (
+            "(:init (hand-at cup) (hand-at mug)) (:goal (sweet cup))",
+            "got .hand-at cup. and .hand-at mug.: it is at one",
+        ),
         ("(:init (spoon_full) (not (spoon_full))) (:goal (sweet cup))", "expected facts that hold together"),
         ("(:init) (:goal)", "with a goal"),
         ("(:objects (cup)) (:goal (sweet cup))", "names of objects"),

@@ -96,7 +96,10 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
         name_of(identifier, names.objects, "objects whose position is known (give the state)")
     listed = [Goal(_fact_of(words, names), value) for words, value in facts if words[0] not in names.shown.values()]
     _check_goals(problem, listed, "facts")
-    known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
+    known = dict.fromkeys(_all_facts(problem), False)
+    if state is not None:  # what is listed to be at a place is there and nowhere else
+        said = {_whose_place(goal.fact) for goal in listed if goal.value}
+        known = {f: value and not ((whose := _whose_place(f)) and whose in said) for f, value in problem.facts.items()}
     return replace(problem, facts=known | dict(listed), goal=_goals(problem, goals))
 
 
@@ -144,8 +147,18 @@ def _check_goals(problem: Problem, goals: Sequence[Goal], what: str = "goals") -
             raise SpecificationError(f"expected {what} in the words of the domain, here {kinds}, got {goal}")
     if both := next((goal for goal in goals if Goal(goal.fact, not goal.value) in goals), None):
         raise SpecificationError(f"expected {what} that hold together, got {both} both true and false")
+    places: dict[Fact, Goal] = {}
+    for goal in goals:
+        whose = _whose_place(goal.fact) if goal.value else None
+        if whose and (other := places.setdefault(whose, goal)) != goal:
+            raise SpecificationError(f"expected {what} that hold together, got {other} and {goal}: it is at one place")
     if not goals and what == "goals":
         raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
+
+
+def _whose_place(fact: Fact) -> Fact | None:
+    """Return what is at one place alone, the hand or an item, of a fact that says where; else None."""
+    return {"hand-at": fact[:1], "in": fact[:2]}.get(fact[0])
 
 
 def shown_arguments(problem: Problem) -> list[tuple[Operator, dict[str, str]]]:
