@@ -85,6 +85,7 @@ def test_things_may_stand_elsewhere_within_what_was_shown(domain):
         ({}, "(sweet jar)", "(stir jar) was not shown so: at = jar is none of what was shown: cup, mug"),
         ({"hand_x": 3.0}, "(sweet cup)", "was not shown so: from = here-"),
         ({"spoon_full": None}, "(sweet cup)", "(spoon_full) is not known"),
+        ({"spoon_full": -1}, "(sweet cup)", "; spoon_full = -1 counts as not known: learned was 0, 1"),
         ({}, "(not (sweet cup))", None),
     ],
 )
@@ -110,6 +111,8 @@ def test_a_goal_that_cannot_be_reached_says_what_is_missing(domain, changes, goa
         "(sweet tea)",
         "(and)",
         "(not)",
+        "(not (and (sweet cup) (sweet mug)))",
+        "(and (hand-at jar) (hand-at cup))",
     ],
 )
 def test_a_goal_in_other_words_is_refused(domain, goal):
@@ -137,10 +140,23 @@ def test_a_plan_survives_json_and_one_that_was_changed_is_refused(plan):
             plan_from_dict(changed)
 
 
+def test_all_that_is_tried_takes_the_time_to_plan_together(domain, monkeypatch):
+    shares = []
+    monkeypatch.setattr("kineme.planning.plan.monotonic", lambda: sum(shares))
+    monkeypatch.setattr("kineme.planning.plan._tried", lambda *task: shares.append(task[3]) or "none")
+    with pytest.raises(DataError, match="give more time"):
+        find_plan(problem_of(domain, tea.now(), GOAL), timeout=10)
+    assert shares == [5, 2.5, 2.5]
+
+
 def test_a_problem_in_pddl_is_planned_where_things_were_shown(domain):
     text = f"""(define (problem two) (:domain tea) (:objects jar cup mug - place)
         (:init (hand-at place-1) (= (total-cost) 0)) (:goal {GOAL}))"""
     assert _makes_tea(find_plan(problem_from_pddl(domain, text)))
+    state = tea.now(spoon_full=1)  # of which the problem says otherwise
+    empty = problem_from_pddl(domain, text.replace("(= (", "(not (spoon_full)) (= ("), state)
+    assert empty.facts["spoon_full",] is False
+    assert problem_from_pddl(domain, text.replace("place-1", "jar"), state).facts["hand-at", "place-1"] is False
     with pytest.raises(SpecificationError, match="whose position is known"):
         problem_from_pddl(domain, text.replace("mug - place", "mug glass - place"))
     with pytest.raises(DataError, match="goal"):
@@ -184,9 +200,12 @@ def test_a_goal_without_its_parentheses_is_refused_with_an_example(domain, goal,
 
 def test_changes_that_fit_no_operator_are_refused(domain):
     text = domain_to_pddl(domain)
+    other = edited(domain, [Edit("stir", "effect", Literal("served", ("at",)), True)])
     for wrong, message in (
+        (domain_to_pddl(other), "expected the PDDL and the JSON of one call"),
         (text.replace("(sweet ?at)", "(sweet ?cup)"), "expected parameters of"),
         (text + ")", "without its"),
+        (text.replace("(sweet ?at)", "(not (and (sweet ?at) (spoon_full)))"), "expected not of one literal"),
         ("(define (problem x))", "expected .define .domain"),
         ("(" * 500 + ")" * 500, "deep"),
     ):
@@ -216,7 +235,10 @@ HOSTILE = [
     "ö",
     "?from",
     "1",
+    "shown carry",
 ]
+#: Predicates that the parser of unified-planning takes for operators of PDDL.
+OPERATORS = ["always", "sometime", "sometime-after", "sometime-before", "at-most-once", "assign", "decrease"]
 
 
 def test_hostile_names_break_neither_pddl_nor_xml_nor_json(domain):
@@ -227,6 +249,8 @@ def test_hostile_names_break_neither_pddl_nor_xml_nor_json(domain):
     )
     hostile = edited(domain, ())
     hostile = type(domain)(domain.vocabulary, operators, domain.places)
+    edits = [Edit("carry", "precondition", Literal(name, (), False), True) for name in OPERATORS]
+    hostile = edited(hostile, edits)
     problem = PDDLReader().parse_problem_string(domain_to_pddl(hostile, ")(evil"))
     assert len(problem.actions) == len(HOSTILE)
     assert edits_in(domain_to_pddl(hostile), hostile) == []

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from kineme.errors import DataError, SpecificationError
 from kineme.planning import Edit, Literal, domain_from_dict, domain_to_dict, edited
-from kineme.planning.domain import is_shown, operator_schema
+from kineme.planning.domain import is_shown, operator_schema, unmade
 from kineme.planning.operators import operators_of
-from kineme.planning.states import States
-from kineme.planning.vocabulary import vocabulary_of
+from kineme.planning.states import States, value_of
+from kineme.planning.vocabulary import Variable, Vocabulary, facts_of, value_notes, vocabulary_of
 
 COLUMN = {name: k for k, name in enumerate(tea.COLUMNS)}
 
@@ -154,6 +154,38 @@ def test_columns_are_told_apart_and_what_says_nothing_is_named():
     assert set(vocabulary.left_out) == {"always", "drift"}
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "meant"),
+    [
+        *[("full", value, False) for value in (0, 0.1, False, np.False_, "False", "no", "0", "empty")],
+        *[("full", value, True) for value in (1, 0.9, True, "true", "Yes", "1.0", "full")],
+        *[("full", value, None) for value in (-1, 2, 0.49, "red", float("inf"), [1])],
+        *[("lit", value, True) for value in (True, "True", "true", 1, "on")],
+        *[("lit", value, None) for value in (0.5, -1, "red")],
+        *[("color-red", "red", True), ("color-red", "green", False), ("color-red", "RED", None)],
+        *[("holding cup", value, True) for value in (1, 0.7, True, "True")],
+        *[("holding cup", value, False) for value in (0, False, "False")],
+        ("holding cup", "open", None),
+        ("width", True, None),
+        *[(name, value, None) for name in ("full", "lit", "color-red") for value in (None, float("nan"), "", "-")],
+    ],
+)  # fmt: skip
+def test_a_value_of_a_state_means_what_was_learned_or_is_not_known_and_named(column, value, meant):
+    variables = (
+        Variable("cup", "item", ("cup_x",)), Variable("full", "flag", ("full",), levels=(0.0, 1.0)),
+        Variable("lit", "flag", ("lit",), words=("False", "True")),
+        Variable("color", "word", ("color",), words=("green", "red")),
+        Variable("width" if column == "width" else "grip", "gripper", ("grip",), threshold=0.5,
+                 levels=(0.03, 0.97) if column != "width" else (0.03, 0.08)),
+    )  # fmt: skip
+    vocabulary = Vocabulary(("x",), variables, 1.0, None if column == "width" else True, {})
+    head = {"color-red": "color", "holding cup": "grip", "width": "grip"}.get(column, column)
+    state = {"hand_x": 0.0, "cup_x": 0.0, head: value}
+    assert facts_of(vocabulary, state, {}).get(tuple(column.split())) is meant
+    noted = [f"{head} = {value}"] if meant is None and value_of(str(value)) is not None else []
+    assert [note.partition(" counts")[0] for note in value_notes(vocabulary, state)] == noted
+
+
 def test_a_domain_survives_json_and_others_are_refused():
     domain = tea.domain()
     data = domain_to_dict(domain)
@@ -189,6 +221,20 @@ def test_edits_are_made_in_their_order_and_the_last_one_counts(order, last):
     literal = Literal("sweet", ("at",))
     edits = [Edit("scoop", "effect", literal, k % 2 == 0) for k in order] + [Edit("scoop", "effect", literal, last)]
     assert ("(sweet ?at)" in tea.literals(edited(domain, edits).operator("scoop"))[1]) == last
+
+
+def test_edits_follow_their_symbol_whatever_it_is_called():
+    states, edit = tea.states(2), Edit("stir", "effect", Literal("served", ("at",)), True)
+    before = operators_of(states, np.ones(len(states)), {"stir": "sym-1", "scoop": "sym-2"}, edits=[edit])
+    data = domain_to_dict(before)
+    del data["edits"][0]["symbol_id"]  # as files had it before
+    edits = domain_from_dict(data).edits
+    assert edits == before.edits == (edit._replace(symbol_id="sym-1"),)
+    after = operators_of(states, np.ones(len(states)), {"scoop": "sym-1", "stir": "sym-2"}, edits=edits)
+    served = ["(served ?at)" in tea.literals(after.operator(name))[1] for name in ("scoop", "stir")]
+    assert (served, unmade(after)) == ([True, False], [])
+    gone = operators_of(states, np.ones(len(states)), {"scoop": "sym-3", "stir": "sym-2"}, edits=edits)
+    assert unmade(gone) == [*gone.edits] == [*edits]
 
 
 def test_wrong_options_are_refused():

@@ -160,6 +160,9 @@ def test_names_that_differ_by_case_are_told_apart():
         ("(sweet ?at)\n", "(sweet)\n", r"expected \(sweet place\) in stir"),
         ("(sweet ?at)\n", "(spoon_full ?at)\n", r"expected \(spoon_full\) in stir"),
         ("(sweet ?at)\n", "(sweet ?at) (not (sweet ?at))\n", "got both"),
+        ("(not (hand-at ?to))  ;", "(not (= ?from ?to))  ;", "expected no = in the precondition of carry"),
+        ("    :effect", "    :precondition (spoon_full)\n    :effect", "each once and with one expression, got :para"),
+        ("    :effect", "    (spoon_full)\n    :effect", "each once and with one expression, got :para"),
     ],
 )
 def test_an_edit_that_a_planner_would_not_follow_is_refused(old, new, message):
@@ -180,10 +183,18 @@ def test_an_empty_precondition_is_one():
     ("text", "message"),
     [
         ("(:init (sweet)) (:goal (sweet cup))", "expected facts in the words"),
-        ("(:init ()) (:goal (sweet cup))", "expected facts in :init"),
+        ("(:init ()) (:goal (sweet cup))", r"expected literals .*, got \(\)"),
+        ("(:init (at 5 (spoon_full))) (:goal (sweet cup))", r"expected literals .*, got \(at 5 \(spoon_full\)\)"),
+        (
+            "(:init (hand-at cup) (hand-at mug)) (:goal (sweet cup))",
+            "got .hand-at cup. and .hand-at mug.: it is at one",
+        ),
+        ("(:init (spoon_full) (not (spoon_full))) (:goal (sweet cup))", "expected facts that hold together"),
         ("(:init) (:goal)", "with a goal"),
         ("(:objects (cup)) (:goal (sweet cup))", "names of objects"),
         ("(:init) (:goal (and (sweet cup) (not (sweet cup))))", "both true and false"),
+        ("(:init) (:goal (sweet cup)) (:init (spoon_full))", "one section :init in PDDL, got 2"),
+        ("(:init) (:goal (sweet cup) (sweet mug))", "one expression in :goal, got 2"),
     ],
 )
 def test_a_problem_that_says_nothing_is_refused(text, message):

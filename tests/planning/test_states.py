@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -212,6 +213,11 @@ def test_from_recordings_to_a_plan_in_the_shell(shown, tmp_path, monkeypatch):
     again = run("operators", "--library", actions, "--states", str(tables / "clock.csv"), "-o", "tea.pddl", "--force")
     assert "kept 1 edit of a person" in again
     assert "(served ?at)" in (tmp_path / "tea.pddl").read_text()
+    shutil.copytree(actions, "fewer")
+    run("library", "delete", "stir", "--library", "fewer", "--yes")
+    fewer = run("operators", "--library", "fewer", "--states", str(tables / "clock.csv"), "-o", "tea.json", "--force")
+    assert "applies to no operator: effect (served ?at) of what was called stir" in fewer
+    assert "kept" not in fewer
     with pytest.raises(AssertionError, match="there"):
         run("operators", "--library", actions, "-o", "tea.pddl")
     run("operators", "--library", actions, "-o", "tea.xml")

@@ -48,8 +48,9 @@ def operators(folder: Any, states: Path | None, output: Path | None, form: str |
     beside = output.with_suffix(".json") if output is not None and form == "pddl" else None
     for path in (output, beside):
         check_new(path, options["force"], *([states] if states else []))
-    edits = edits_of(output) if output is not None and form != "behavior-tree" else []
     with opts.opened(folder) as library:
+        ids = {symbol.id for symbol in library.symbols()}
+        edits = edits_of(output, ids) if output is not None and form != "behavior-tree" else []
         domain = learn_operators(
             library, states, radius=options["radius"], error_rate=options["error_rate"], edits=edits
         )
@@ -77,17 +78,28 @@ def write_domain(domain: Any, output: Path, form: str) -> list[Path]:
     ]
 
 
-def edits_of(path: Path) -> list[Any]:
-    """Return a person's edits of a domain that is there: those it lists, and the changes of its PDDL."""
+def edits_of(path: Path, ids: set[str] | None = None) -> list[Any]:
+    """Return a person's edits of a domain that is there: those it lists, and the changes of its PDDL.
+
+    Where none of its symbols is among `ids`, those of a library, that one was built anew, and names count.
+    """
     from kineme.planning.domain import read_domain
-    from kineme.planning.pddl import edits_in
+    from kineme.planning.pddl import edits_in, is_signed
 
     plain = path.with_suffix(".json")
     if not plain.is_file():
         return []
     domain = read_domain(plain)
-    changed = edits_in(path.read_text(encoding="utf-8"), domain) if path.suffix == ".pddl" and path.is_file() else []
-    return [*domain.edits, *changed]
+    text = path.read_text(encoding="utf-8") if path.suffix == ".pddl" and path.is_file() else None
+    changed = [] if text is None else edits_in(text, domain)
+    if text and changed and not is_signed(text):
+        write(f"note: all that differs from {printable(str(plain))} in {printable(str(path))} counts as changes of a "
+              "person, since it does not say of which operators it was written", err=True)  # fmt: skip
+    edits = [*domain.edits, *changed]
+    if edits and ids is not None and ids.isdisjoint(operator.symbol_id for operator in domain.operators):
+        write("note: no symbol of the domain before is in this library; its edits go by the names of symbols", err=True)
+        return [edit._replace(symbol_id="") for edit in edits]
+    return edits
 
 
 def opened_domain(path: Path) -> Any:
@@ -102,7 +114,7 @@ def opened_domain(path: Path) -> Any:
 
 
 def _domain_text(domain: Any, written: list[str]) -> str:
-    from kineme.planning.domain import kinds_in_words
+    from kineme.planning.domain import kinds_in_words, unmade
 
     lines = []
     for operator in domain.operators:
@@ -121,8 +133,14 @@ def _domain_text(domain: Any, written: list[str]) -> str:
     never = sorted({row.predicate for operator in domain.operators for row in operator.evidence if not row.varied})
     if never:
         lines.append(f"never varied, so that nobody has seen whether it counts: {', '.join(never)}")
-    if domain.edits:
-        lines.append(f"kept {counted(len(domain.edits), 'edit')} of a person")
+    lost = unmade(domain)
+    if kept := len(domain.edits) - len(lost):
+        lines.append(f"kept {counted(kept, 'edit')} of a person")
+    lines += [
+        f"an edit of a person applies to no operator: {edit.part} {printable(str(edit.literal))} of what was called "
+        f"{printable(edit.operator)}"
+        for edit in lost
+    ]
     return "\n".join([*lines, *(f"wrote {path}" for path in written)])
 
 
@@ -172,6 +190,8 @@ def plan(domain: Path, problem: Path | None, folder: Any, output: Path | None, *
         raise SpecificationError("expected the state now with --goal: give --state now.csv")
     else:
         task = problem_of(known, state, options["goal"])
+    for note in task.notes:
+        write(f"note: {note}", err=True)
     steps = find_plan(task, options["planner"], options["timeout"])
     follows = None if folder is None else _follow(folder, steps, options["plot"])
     data = plan_to_dict(steps) | {"written": [], "follows": follows}

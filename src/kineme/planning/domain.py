@@ -94,10 +94,11 @@ class Operator:
 class Edit(NamedTuple):
     """A person's change of an operator, which survives learning again."""
 
-    operator: str
+    operator: str  # its name, which counts where there is no id
     part: str  # "precondition" or "effect"
     literal: Literal
     added: bool  # else taken away
+    symbol_id: str = ""  # of the operator, which outlives a new name
 
 
 @dataclass(frozen=True)
@@ -123,12 +124,12 @@ def edited(domain: Domain, edits: Sequence[Edit]) -> Domain:
 
     An edit of an effect that the movements did not decide decides it.
     """
-    operators = []
+    edits, operators = _bound(edits, domain.operators), []
     for operator in domain.operators:
         parts = {"precondition": list(operator.preconditions), "effect": list(operator.effects)}
         decided = set()
         for edit in edits:
-            if edit.operator != operator.name:
+            if not _is_edited(operator, edit):
                 continue
             if edit.part not in parts:
                 raise SpecificationError(f"expected an edit of a precondition or an effect, got {edit.part!r}")
@@ -148,7 +149,27 @@ def edited(domain: Domain, edits: Sequence[Edit]) -> Domain:
         operators.append(
             replace(operator, preconditions=tuple(parts["precondition"]), effects=tuple(parts["effect"]), usable=usable)
         )
-    return replace(domain, operators=tuple(operators), edits=tuple(edits))
+    return replace(domain, operators=tuple(operators), edits=edits)
+
+
+def _is_edited(operator: Operator, edit: Edit) -> bool:
+    if edit.symbol_id and operator.symbol_id:
+        return edit.symbol_id == operator.symbol_id
+    return edit.operator == operator.name
+
+
+def _bound(edits: Sequence[Edit], operators: Sequence[Operator]) -> tuple[Edit, ...]:
+    """Return edits with the names and ids that their operators have now; those of none stay as they are."""
+    of = [next((each for each in operators if _is_edited(each, edit)), None) for edit in edits]
+    return tuple(
+        edit if operator is None else edit._replace(operator=operator.name, symbol_id=operator.symbol_id)
+        for edit, operator in zip(edits, of, strict=True)
+    )
+
+
+def unmade(domain: Domain) -> list[Edit]:
+    """List the edits of operators that are not there, as after their symbol was deleted."""
+    return [edit for edit in domain.edits if not any(_is_edited(operator, edit) for operator in domain.operators)]
 
 
 def kinds_in_words(parameter: Parameter) -> str:
@@ -221,7 +242,8 @@ def domain_from_dict(data: Any) -> Domain:
         vocabulary = _record(Vocabulary, words | {"variables": variables})
         for each in variables:
             n = len(vocabulary.axes) if each.kind in ("fixture", "item") else 1
-            if len(each.columns) != n or (each.kind == "flag" and len(each.words) not in (0, 2)):
+            two = (each.words, each.levels) if each.kind == "flag" else (each.levels,)
+            if len(each.columns) != n or any(len(values) not in (0, 2) for values in two):
                 raise ValueError(f"{each.name} has {len(each.columns)} columns and {len(each.words)} words")
         records = (("parameters", Parameter), ("preconditions", Literal), ("effects", Literal), ("evidence", Evidence))
         operators = tuple(
@@ -230,7 +252,7 @@ def domain_from_dict(data: Any) -> Domain:
         )
         places = {name: tuple(map(float, where)) for name, where in data["places"].items()}
         edits = tuple(_record(Edit, edit | {"literal": _record(Literal, edit["literal"])}) for edit in data["edits"])
-        domain = Domain(vocabulary, operators, places, edits)
+        domain = Domain(vocabulary, operators, places, _bound(edits, operators))  # earlier files have no ids of edits
         check_positions(vocabulary.axes, _positions(domain))
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(

@@ -6,9 +6,11 @@ operator is a static predicate over its parameters, ``(shown-carry ?from ?to ?it
 
 from __future__ import annotations
 
+import json
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
+from hashlib import sha256
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
@@ -18,10 +20,13 @@ from kineme.reporting.text import first_names, printable
 
 _RESERVED = frozenset(
     {"and", "or", "not", "imply", "exists", "forall", "when", "either", "object", "place", "item", "number", "define",
-     "total-cost", "increase", "minimize", "domain", "problem"}
+     "total-cost", "increase", "decrease", "assign", "minimize", "domain", "problem", "always", "sometime",
+     "sometime-after", "sometime-before", "at-most-once"}
 )  # fmt: skip
+_Words = tuple[tuple[str, ...], bool]  # a literal: its words, and whether it is true
 _LONGEST = 60  # characters of an identifier
 _MOST_TOKENS, _DEEPEST = 1_000_000, 200
+_DIGEST = re.compile(r"; of the operators ([0-9a-f]+)")
 _TOKEN = re.compile(r";[^\n]*|[()]|[^\s()]+")
 
 
@@ -57,7 +62,10 @@ class Names:
         self.predicates = identifiers(self.types)
         self.operators = identifiers((operator.name for operator in domain.operators), self.predicates.values())
         prefix = "shown"
-        while any(text.startswith(f"{prefix}-") for text in self.predicates.values()):
+        own = {*self.operators.values()}
+        while any(text.startswith(f"{prefix}-") for text in self.predicates.values()) or any(
+            f"{prefix}-{text}" in own for text in own
+        ):
             prefix = f"was-{prefix}"
         self.shown = {name: f"{prefix}-{text}" for name, text in self.operators.items()}
         self.objects = identifiers(
@@ -72,6 +80,7 @@ def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
     usable = [operator for operator in domain.operators if operator.usable]
     predicates += [_typed(names.shown[each.name], [p.type for p in each.parameters]) for each in usable]
     lines = [
+        f"; of the operators {_digest(domain)}, by which the file beside it is known",
         f"(define (domain {identifiers([name])[name]})",
         "  (:requirements :strips :typing :negative-preconditions :action-costs)",
         "  (:types place item)",
@@ -83,6 +92,20 @@ def domain_to_pddl(domain: Domain, name: str = "kineme") -> str:
     for operator in domain.operators:
         lines += _action(operator, names) if operator.usable else _left_out(operator)
     return "\n".join([*lines, ")", ""])
+
+
+def _digest(domain: Domain) -> str:
+    """Return the digest of all that a person's changes are compared with."""
+    said = [
+        [each.name, each.usable, [parameter[:2] for parameter in each.parameters], each.preconditions, each.effects]
+        for each in domain.operators
+    ]
+    return sha256(json.dumps(said).encode()).hexdigest()[:16]
+
+
+def is_signed(text: str) -> bool:
+    """Tell whether a domain in PDDL says which operators it was written of; those of earlier versions do not."""
+    return _DIGEST.search(text) is not None
 
 
 def _typed(predicate: str, types: Iterable[str]) -> str:
@@ -180,14 +203,27 @@ def parsed(text: str) -> Any:
     return stack[0][0]
 
 
-def literals_of(expression: Any) -> list[tuple[tuple[str, ...], bool]]:
+def _plain(expression: Any) -> str:
+    """Return an expression as it was written."""
+    return f"({' '.join(map(_plain, expression))})" if isinstance(expression, list) else str(expression)
+
+
+def literals_of(expression: Any) -> list[_Words]:
     """Return the literals of a conjunction, as ``(and (in cup shelf) (not (full cup)))``: words, and whether true."""
     if isinstance(expression, list) and expression and expression[0] == "and":
         return [literal for part in expression[1:] for literal in literals_of(part)]
     if isinstance(expression, list) and len(expression) == 2 and expression[0] == "not":
-        return [(words, not value) for words, value in literals_of(expression[1])]
+        within = literals_of(expression[1])
+        if len(within) != 1:  # of several, at least one is false, and nothing says which
+            raise DataError(
+                f"expected not of one literal, as (not (full cup)), got it of {len(within)}; write (not ...) around "
+                "each that is to be false"
+            )
+        return [(words, not value) for words, value in within]
     if not (isinstance(expression, list) and expression and all(isinstance(word, str) for word in expression)):
-        raise DataError(f"expected literals and their conjunctions, as (and (in cup shelf)), got {expression!r:.100}")
+        raise DataError(
+            f"expected literals and their conjunctions, as (and (in cup shelf)), got {_plain(expression):.100}"
+        )
     return [(tuple(expression), True)]
 
 
@@ -202,7 +238,7 @@ def _sections(expression: Any, what: str) -> dict[str, list[Any]]:
     sections: dict[str, list[Any]] = {}
     for part in expression[1:]:
         if not isinstance(part, list) or not part or not isinstance(part[0], str):
-            raise DataError(f"expected sections in parentheses in PDDL, got {part!r:.100}")
+            raise DataError(f"expected sections in parentheses in PDDL, got {_plain(part):.100}")
         sections.setdefault(part[0], []).append(part[1:])
     return sections
 
@@ -210,8 +246,14 @@ def _sections(expression: Any, what: str) -> dict[str, list[Any]]:
 def edits_in(text: str, domain: Domain) -> list[Edit]:
     """Return a person's changes in the PDDL of a domain: what differs from what `domain_to_pddl` wrote of it.
 
-    Literals of preconditions and effects count; operators and predicates are told by their identifiers.
+    Literals of preconditions and effects count; operators and predicates are told by their identifiers. Raises
+    `DataError`: a text that was written of another domain, where what was learned since would count as a change.
     """
+    if (signed := _DIGEST.search(text)) and signed[1] != _digest(domain):
+        raise DataError(
+            "expected the PDDL and the JSON of one call of kineme operators, got those of two; restore the JSON of "
+            "this PDDL, or move the PDDL away, learn into it anew and make your changes again"
+        )
     names = Names(domain)
     sections = _sections(parsed(text), "domain").get(":action", [])
     actions = {part[0]: part[1:] for part in sections if part and isinstance(part[0], str)}
@@ -225,8 +267,7 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
     predicate_of = {text: name for name, text in names.predicates.items()}
     edits = []
     for operator in usable:
-        action = actions[names.operators[operator.name]]
-        content = {action[k]: action[k + 1] for k in range(0, len(action) - 1, 2) if isinstance(action[k], str)}
+        content = _content(operator.name, actions[names.operators[operator.name]])
         for part, learned in (("precondition", operator.preconditions), ("effect", operator.effects)):
             expressions = [each for each in _conjuncts(content.get(f":{part}", ["and"])) if each[:1] != ["increase"]]
             present = [
@@ -236,6 +277,11 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
                 for words, value in literals_of(["and", *expressions])
                 if words[0] != names.shown[operator.name]
             ]
+            if any(literal.predicate == "=" for literal in present):
+                raise DataError(
+                    f"expected no = in the {part} of {operator.name}, got one; take it out, arguments are always "
+                    "different things"
+                )
             parameters = [parameter.name for parameter in operator.parameters]
             if unknown := next((literal for literal in present if {*literal.arguments} - {*parameters}), None):
                 raise DataError(
@@ -243,9 +289,29 @@ def edits_in(text: str, domain: Domain) -> list[Edit]:
                 )
             if both := next((each for each in present if each._replace(value=not each.value) in present), None):
                 raise DataError(f"expected {both} of {operator.name} true or false in its {part}, got both")
-            edits += [Edit(operator.name, part, literal, True) for literal in present if literal not in learned]
-            edits += [Edit(operator.name, part, literal, False) for literal in learned if literal not in present]
+            edits += [
+                Edit(operator.name, part, literal, True, operator.symbol_id)
+                for literal in present
+                if literal not in learned
+            ]
+            edits += [
+                Edit(operator.name, part, literal, False, operator.symbol_id)
+                for literal in learned
+                if literal not in present
+            ]
     return edits
+
+
+def _content(name: str, action: list[Any]) -> dict[str, Any]:
+    """Return keyword -> its expression, of an action; refuse what would leave out one of them."""
+    heads = action[::2]
+    if len(action) % 2 or any(str(head)[:1] != ":" or heads.count(head) > 1 for head in heads):
+        got = " ".join("(...)" if isinstance(word, list) else word for word in action)
+        raise DataError(
+            f"expected :parameters, :precondition and :effect of {name}, each once and with one expression, got "
+            f"{got:.100}; join several by (and ...)"
+        )
+    return dict(zip(heads, action[1::2], strict=True))
 
 
 def _conjuncts(expression: Any) -> list[Any]:
@@ -254,11 +320,15 @@ def _conjuncts(expression: Any) -> list[Any]:
     return expression[1:] if isinstance(expression, list) and expression[:1] == ["and"] else [expression]
 
 
-def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tuple[tuple[str, ...], bool]]]:
+def read_problem(text: str) -> tuple[list[str], list[_Words], list[_Words]]:
     """Return objects, facts and goal of a problem in PDDL, in identifiers; costs and metrics are left out."""
     sections = _sections(parsed(text), "problem")
+    if twice := next((name for name in (":objects", ":init", ":goal") if len(sections.get(name, [])) > 1), None):
+        raise DataError(f"expected one section {twice} in PDDL, got {len(sections[twice])}; join them")
     if not any(sections.get(":goal", [])):
         raise DataError("expected a problem with a goal, got none; add (:goal ...)")
+    if (n := len(sections[":goal"][0])) > 1:
+        raise DataError(f"expected one expression in :goal, got {n}; join them by (and ...)")
     words = sections.get(":objects", [[]])[0]
     objects, position = [], 0
     while position < len(words):  # a b - place c - item
@@ -267,12 +337,10 @@ def read_problem(text: str) -> tuple[list[str], list[tuple[str, ...]], list[tupl
         elif isinstance(words[position], str):
             objects.append(words[position])
         else:
-            raise DataError(f"expected names of objects in :objects, got {words[position]!r:.100}")
+            raise DataError(f"expected names of objects in :objects, got {_plain(words[position]):.100}")
         position += 1
-    init = [fact for fact in sections.get(":init", [[]])[0] if fact[:1] != ["="]]
-    if any(not isinstance(fact, list) or not fact or not all(isinstance(word, str) for word in fact) for fact in init):
-        raise DataError("expected facts in :init, as (in cup shelf), got something else")
-    return objects, [*map(tuple, init)], literals_of(sections[":goal"][0][0])
+    facts = literals_of(["and", *(fact for fact in sections.get(":init", [[]])[0] if fact[:1] != ["="])])
+    return objects, facts, literals_of(sections[":goal"][0][0])
 
 
 def name_of(identifier: str, identifier_of: Mapping[str, str], what: str) -> str:

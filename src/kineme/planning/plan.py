@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,7 +67,7 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
 
     - `planner`: name of an engine that is installed, as "aries" or "fast-downward"; by default one that takes the
       problem as it is, else one that takes it without costs and negative preconditions.
-    - `timeout`: [s], half of it with costs.
+    - `timeout`: [s], of all that is tried together; half of it with costs.
 
     Raises `SpecificationError`: there is no plan, with the goals that no order of operators reaches; or a step depends
     on what is not known. Raises `DataError`: the extra ``planner`` is not installed, no engine takes the problem, or
@@ -77,7 +78,9 @@ def find_plan(problem: Problem, planner: str | None = None, timeout: float = 30.
         return Plan(problem, (), "no planner")
     shown = shown_arguments(problem)
     if missing := unreachable(problem, shown):
-        raise SpecificationError(f"expected a goal that operators reach within what was shown; {'; '.join(missing)}")
+        raise SpecificationError(
+            f"expected a goal that operators reach within what was shown; {_because(missing, problem)}"
+        )
     true = [fact for fact, value in problem.facts.items() if value]
     texts = (
         domain_to_pddl(problem.domain),
@@ -117,11 +120,13 @@ def _solved(texts: tuple[str, str], planner: str | None, timeout: float) -> tupl
     simple = problem.clone()
     simple.clear_quality_metrics()
     failures: list[str] = []
+    end = monotonic() + timeout
     for candidate, compiles in ((problem, False), (simple, False), (simple, True)):
+        left = max(0.1, end - monotonic())
         # Engines warn of options that they do not know, and of processes that they leave to be collected.
         with warnings.catch_warnings(), tempfile.TemporaryFile("w") as log:
             warnings.simplefilter("ignore")
-            result = _tried(candidate, compiles, planner, 0.5 * timeout, log)
+            result = _tried(candidate, compiles, planner, left if compiles else 0.5 * left, log)
         if isinstance(result, str):
             failures.append(result)
             continue
@@ -185,11 +190,15 @@ def check_plan(plan: Plan) -> None:
         )
         if reasons:
             raise SpecificationError(
-                f"expected steps that can be done, step {number} {step} cannot: {'; '.join(reasons)}"
+                f"expected steps that can be done, step {number} {step} cannot: {_because(reasons, plan.problem)}"
             )
         facts = facts_after(facts, operator, step.arguments)
     if missed := [str(goal) for goal in plan.problem.goal if facts.get(goal.fact) is not goal.value]:
         raise SpecificationError(f"expected a plan that reaches its goal, it misses {', '.join(missed)}")
+
+
+def _because(reasons: Sequence[str], problem: Problem) -> str:
+    return "; ".join((*reasons, *problem.notes))
 
 
 def plan_to_dict(plan: Plan) -> dict[str, Any]:

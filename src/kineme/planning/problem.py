@@ -13,7 +13,7 @@ from kineme.errors import SpecificationError
 from kineme.planning.domain import Domain, Literal, Operator, is_shown
 from kineme.planning.pddl import Names, literals_of, name_of, parsed, read_problem
 from kineme.planning.states import State
-from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of, state_in
+from kineme.planning.vocabulary import Fact, facts_of, places_of, position_of, predicates_of, state_in, value_notes
 from kineme.validation import Array, as_point
 
 _MOST_GROUND = 200_000  # operators with arguments, at most
@@ -38,6 +38,7 @@ class Problem:
     places: Mapping[str, Array]  # (k,) each
     facts: Mapping[Fact, bool]  # what is not among them is not known
     goal: tuple[Goal, ...]
+    notes: tuple[str, ...] = ()  # values of the state that count as not known
 
     @property
     def objects(self) -> dict[str, str]:
@@ -67,7 +68,9 @@ def problem_of(
         named[name] = as_point(f"the place {name}", where, domain.vocabulary.axes)
     state = state_in(domain.vocabulary, state)
     at = _places_now(domain, state, named)
-    problem = Problem(domain, at, facts_of(domain.vocabulary, state, at), ())
+    problem = Problem(
+        domain, at, facts_of(domain.vocabulary, state, at), (), tuple(value_notes(domain.vocabulary, state))
+    )
     if isinstance(goal, str):
         return replace(problem, goal=_goals(problem, literals_of(parsed(goal))))
     goals = tuple(goal)
@@ -86,14 +89,18 @@ def problem_from_pddl(domain: Domain, text: str, state: State | None = None) -> 
     at = named | {each.name: np.array(each.typical) for each in domain.vocabulary.of_kind("fixture") if each.typical}
     state = None if state is None else state_in(domain.vocabulary, state)
     at = at if state is None else _places_now(domain, state, named)
-    problem = Problem(domain, at, {} if state is None else facts_of(domain.vocabulary, state, at), ())
+    facts_now = {} if state is None else facts_of(domain.vocabulary, state, at)
+    problem = Problem(domain, at, facts_now, (), tuple(value_notes(domain.vocabulary, state or {})))
     names = Names(domain, problem.objects)
     for identifier in objects:
         name_of(identifier, names.objects, "objects whose position is known (give the state)")
-    listed = {_fact_of(words, names) for words in facts if words[0] not in names.shown.values()}
-    _check_goals(problem, [Goal(fact) for fact in listed], "facts")
-    known = dict(problem.facts) if state is not None else dict.fromkeys(_all_facts(problem), False)
-    return Problem(domain, at, known | dict.fromkeys(listed, True), _goals(problem, goals))
+    listed = [Goal(_fact_of(words, names), value) for words, value in facts if words[0] not in names.shown.values()]
+    _check_goals(problem, listed, "facts")
+    known = dict.fromkeys(_all_facts(problem), False)
+    if state is not None:  # what is listed to be at a place is there and nowhere else
+        said = {_whose_place(goal.fact) for goal in listed if goal.value}
+        known = {f: value and not ((whose := _whose_place(f)) and whose in said) for f, value in problem.facts.items()}
+    return replace(problem, facts=known | dict(listed), goal=_goals(problem, goals))
 
 
 def _places_now(domain: Domain, state: State, named: Mapping[str, Array]) -> dict[str, Array]:
@@ -139,9 +146,19 @@ def _check_goals(problem: Problem, goals: Sequence[Goal], what: str = "goals") -
             kinds = "nothing" if wanted is None else f"({' '.join((goal.fact[0], *wanted))})"
             raise SpecificationError(f"expected {what} in the words of the domain, here {kinds}, got {goal}")
     if both := next((goal for goal in goals if Goal(goal.fact, not goal.value) in goals), None):
-        raise SpecificationError(f"expected goals that hold together, got {both} both true and false")
+        raise SpecificationError(f"expected {what} that hold together, got {both} both true and false")
+    places: dict[Fact, Goal] = {}
+    for goal in goals:
+        whose = _whose_place(goal.fact) if goal.value else None
+        if whose and (other := places.setdefault(whose, goal)) != goal:
+            raise SpecificationError(f"expected {what} that hold together, got {other} and {goal}: it is at one place")
     if not goals and what == "goals":
         raise SpecificationError("expected a goal, got none; as (and (in cup shelf))")
+
+
+def _whose_place(fact: Fact) -> Fact | None:
+    """Return what is at one place alone, the hand or an item, of a fact that says where; else None."""
+    return {"hand-at": fact[:1], "in": fact[:2]}.get(fact[0])
 
 
 def shown_arguments(problem: Problem) -> list[tuple[Operator, dict[str, str]]]:

@@ -88,9 +88,8 @@ def _flags(vocabulary: Vocabulary, facts: Mapping[Fact, bool]) -> dict[str, Any]
         value = facts.get((variable.name, *owner))
         if value is not None:
             half = max(abs(variable.threshold), 0.5)
-            values[column] = (
-                variable.words[value] if variable.words else variable.threshold + (half if value else -half)
-            )
+            levels = variable.levels or (variable.threshold - half, variable.threshold + half)
+            values[column] = (variable.words or levels)[value]
     return values
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from kineme.errors import DataError, SpecificationError
 from kineme.planning.skill import is_gripper
 from kineme.planning.states import HAND, State, States, check_number_in, in_unit, value_of
-from kineme.reporting.text import first_names
+from kineme.reporting.text import first_names, printable
 from kineme.units import split_head
 from kineme.validation import Array
 
@@ -53,6 +53,7 @@ class Variable(NamedTuple):
     words: tuple[str, ...] = ()  # of a column of words; of a flag of words: which mean false, true
     threshold: float = 0.5  # of a flag of numbers: above is true
     typical: tuple[float, ...] = ()  # of a fixture, the median of where it stood
+    levels: tuple[float, ...] = ()  # of a flag or a gripper of numbers: the two that mean false, true
 
 
 @dataclass(frozen=True)
@@ -181,11 +182,11 @@ def _said(column: str, values: Array, words: tuple[str, ...] | None, objects: Se
     if low == high:
         if kind == "gripper" or low not in (0.0, 1.0):
             return f"it is always {low:g}"
-        return Variable(name, kind, (column,), owner)
+        return Variable(name, kind, (column,), owner, levels=(0.0, 1.0))
     middle = 0.5 * (low + high)
     if np.minimum(levels - low, high - levels).max() > _SPREAD * (high - low):
         return f"{len(levels)} different numbers are neither two levels nor a position with all of its axes"
-    return Variable(name, kind, (column,), owner, threshold=middle)
+    return Variable(name, kind, (column,), owner, threshold=middle, levels=(low, high))
 
 
 def _said_in_words(name: str, column: str, owner: str, words: tuple[str, ...]) -> Variable | str:
@@ -330,9 +331,9 @@ def _held(vocabulary: Vocabulary, state: State) -> dict[str, bool | None]:
     if not vocabulary.tells_grasp:
         return {item.name: False for item in items}
     gripper = next(iter(vocabulary.of_kind("gripper")), None)
-    value = math.nan if gripper is None else _as_number(state.get(gripper.columns[0]))
-    if gripper is None or (value > gripper.threshold) != vocabulary.closed_above or np.isnan(value):
-        return dict.fromkeys((item.name for item in items), None if np.isnan(value) else False)
+    is_above = None if gripper is None else _truth(gripper, state.get(gripper.columns[0]))
+    if is_above is None or is_above != vocabulary.closed_above:
+        return dict.fromkeys((item.name for item in items), None if is_above is None else False)
     hand = hand_of(vocabulary, state)
     away = {item.name: float(np.linalg.norm(position_of(item.columns, state) - hand)) for item in items}
     near = {name: distance for name, distance in away.items() if distance <= vocabulary.radius}
@@ -394,17 +395,50 @@ def _predicates(variable: Variable) -> list[str]:
 def _flags(vocabulary: Vocabulary, variable: Variable, state: State) -> dict[Fact, bool]:
     arguments = (variable.owner,) if variable.owner else ()
     value = state.get(variable.columns[0])
-    if value is None or (isinstance(value, float) and np.isnan(value)):
-        return {}
-    if variable.kind == "word" or (variable.kind == "flag" and variable.words):
-        word = value if isinstance(value, str) else f"{value:g}"
-        if variable.kind == "word":
-            return {(f"{variable.name}-{name}", *arguments): name == word for name in variable.words}
-        return {(variable.name, *arguments): word == variable.words[1]} if word in variable.words else {}
+    if variable.kind == "word":
+        word = _word(value)
+        return {
+            (f"{variable.name}-{name}", *arguments): name == word for name in variable.words if word in variable.words
+        }
     if variable.kind == "gripper" and vocabulary.tells_grasp:
         return {}  # it is said by holding and hand-empty
-    number = _as_number(value)
-    return {} if np.isnan(number) else {(variable.name, *arguments): bool(number > variable.threshold)}
+    truth = _truth(variable, value)
+    return {} if truth is None else {(variable.name, *arguments): truth}
+
+
+def _word(value: Any) -> str:
+    """Return what a state says as a word; empty where it says nothing."""
+    said = value_of(str(value))
+    return f"{said:g}" if isinstance(said, float) else said or ""
+
+
+def _truth(variable: Variable, value: Any) -> bool | None:
+    """Tell whether a value of a flag means true, or one of a gripper its upper level; None where it means neither."""
+    said, word = value_of(str(value)), _word(value)
+    if variable.kind == "gripper" and word.lower() in ("true", "false"):
+        if variable.levels and not np.allclose(variable.levels, (0.0, 1.0), atol=_SPREAD):
+            return None  # is true an open one?
+        said = float(word.lower() == "true")
+    if isinstance(said, float) and not variable.words:
+        away = min((abs(said - level) for level in variable.levels), default=0.0)
+        is_level = variable.kind == "gripper" or away <= _SPREAD * float(np.ptp(variable.levels or 0.0))
+        return said > variable.threshold if is_level else None
+    if word in variable.words:
+        return word == variable.words[1]
+    is_listed = variable.kind == "flag" and word.lower() in _TRUE | _FALSE
+    return word.lower() in _TRUE if is_listed else None
+
+
+def value_notes(vocabulary: Vocabulary, state: State) -> list[str]:
+    """Say which values of flags, words and grippers count as not known, since they are none that was learned."""
+    notes = []
+    for variable in vocabulary.of_kind(*_TELLING):
+        word = _word(state.get(variable.columns[0]))
+        is_known = word in variable.words if variable.kind == "word" else _truth(variable, word) is not None
+        if word and not is_known:
+            learned = first_names(variable.words or [f"{level:g}" for level in variable.levels], 12)
+            notes.append(f"{variable.columns[0]} = {printable(word)} counts as not known: learned was {learned}")
+    return notes
 
 
 def predicates_of(vocabulary: Vocabulary) -> dict[str, tuple[str, ...]]:
