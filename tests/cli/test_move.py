@@ -108,6 +108,7 @@ def test_bags_and_goals_hold_the_same_joints(wave):
     words = ("--at", "0.45,-0.2,0.3", "--slow-down", "-o", "j.csv", "--ros1", "w.bag", "--ros2", "w.mcap")
     result = run("wave.csv", "--robot", "panda", *words, "--action-goal", "goal.yaml")
     assert result.exit_code == 0, result.output
+    assert 'note: the steps of "gripper" are not in an action goal' in result.output
     from pathlib import Path
 
     from rosbags.highlevel import AnyReader

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 import threading
@@ -10,7 +12,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 
 CLOSED = r"expected an open library, got .*library\.sqlite, which has been closed; open it again"
 
@@ -77,3 +79,11 @@ def test_a_closed_library_says_so(folder):
     for use in (len, ActionLibrary.movements, ActionLibrary.symbols, lambda it: it.rename("1", "one")):
         with pytest.raises(DataError, match=CLOSED):
             use(library)
+
+
+def test_a_library_is_not_pickled_but_says_that_each_process_opens_it(folder):
+    with ActionLibrary(folder, read_only=True) as library:
+        for copied in (pickle.dumps, copy.deepcopy):
+            with pytest.raises(SpecificationError, match=r"the open one in .*actions to be .* open it in each process"):
+                copied(library)
+        assert len(copy.copy(library)) == 300  # over the same connection

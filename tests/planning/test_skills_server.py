@@ -7,6 +7,7 @@ import json
 import os
 import re
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import anyio
@@ -562,6 +563,15 @@ def test_a_file_that_another_program_wrote_meanwhile_stays(skills, library, tmp_
     with pytest.raises(FileExistsError):
         write("carry", movement)
     assert (tmp_path / "0001-carry.yaml").read_text() == "mine"
+
+
+def test_what_an_action_goal_does_not_hold_is_said_before_and_after(skills, library, tmp_path):
+    shown, words = skills.call("execute_carry", middle(library)).preview, 'ote: the steps of "gripper" are not in an'
+    sent = shown.movement.trajectory
+    grasps = replace(shown.movement, trajectory=replace(sent, steps={"gripper": 0.0 * sent.times}))
+    for movement, is_said in ((shown.movement, False), (grasps, True)):
+        for text in (str(shown._replace(movement=movement)), written_to(tmp_path)("carry", movement)):
+            assert (words in text) is is_said
 
 
 def test_the_command_simulates_what_was_approved(folder, library):

@@ -48,11 +48,12 @@ def test_it_is_the_polynomial_of_the_fifth_order():
     rng = np.random.default_rng(0)
     times = np.cumsum(rng.uniform(0.1, 1, 6))
     q, v, a = rng.normal(size=(3, 6, 2))
-    given = JointTrajectory(("a", "b"), times - times[0], q, v, a, {"grip": np.arange(6.0)})
+    given = JointTrajectory(("a", "b"), times - times[0], q, v, a, {"grip": np.arange(6.0)}, ("rad", "m"))
     fine = fine_times(given, 7)
     curve = BPoly.from_derivatives(given.times, np.stack((q, v, a), axis=1))
     positions, velocities, accelerations = curve(fine), curve(fine, 1), curve(fine, 2)
     made = between(given, fine)
+    assert made.units == given.units
     np.testing.assert_allclose(made.positions, positions, atol=1e-9)
     np.testing.assert_allclose(made.velocities, velocities, atol=1e-8)
     np.testing.assert_allclose(made.accelerations[:-1], accelerations[:-1], atol=1e-6)
@@ -223,6 +224,9 @@ def test_a_refusal_for_too_few_samples_says_a_rate_that_works():
     move(stroke(robot, 3.0), robot, rate=20.0)
 
 
+BACKWARDS = tuple(f"{j}_joint" for j in ("wrist_3", "wrist_2", "wrist_1", "elbow", "shoulder_lift", "shoulder_pan"))
+
+
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
@@ -231,11 +235,18 @@ def test_a_refusal_for_too_few_samples_says_a_rate_that_works():
         ({"velocities": np.full((4, 6), np.inf)}, "finite numbers"),
         ({"accelerations": np.zeros((3, 6))}, r"accelerations of shape \(4, 6\)"),
         ({"positions": np.zeros((4, 7))}, r"positions of shape \(4, 6\)"),
+        ({"positions": [[0.0] * 7] * 4}, r"positions of shape \(4, 6\)"),
+        ({"times": np.arange(4.0) - 1}, "times increase from 0"),
+        ({"joints": BACKWARDS}, "joints of ur5e, shoulder_pan_joint, .*, in this order, got wrist_3_joint, wrist_2"),
+        ({"joints": ()}, "wrist_3_joint, in this order, got none"),
+        ({"units": ("deg",) * 6}, "units of ur5e, rad, .* got deg, deg"),
+        ({"steps": {"gripper": [0.0] * 3}}, r"steps of gripper of shape \(4,\), one for each sample"),
+        ({"steps": {"gripper": np.full(4, np.nan)}}, "finite numbers"),
     ],
 )
 def test_what_is_no_trajectory_of_the_arm_is_not_checked_but_refused(changed, words):
     robot = _robot("ur5e")
     zeros = np.zeros((4, 6))
-    arrays = {"times": np.arange(4.0), "positions": zeros, "velocities": zeros, "accelerations": zeros} | changed
+    arrays = {"times": np.arange(4.0), "positions": zeros, "velocities": zeros, "accelerations": zeros}
     with pytest.raises(TrajectoryError, match=words):
-        preflight(robot, JointTrajectory(robot.joints, **arrays, steps={}))
+        preflight(robot, JointTrajectory(**({"joints": robot.joints, "steps": {}} | arrays | changed)))

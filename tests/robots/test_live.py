@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -172,3 +174,9 @@ def test_a_simulated_panda_follows_the_slowed_trajectory():
         data.qfrc_applied[:] = np.clip(push + data.qfrc_bias, -robot.effort, robot.effort)
         mujoco.mj_step(arm, data)
     assert off.max() < 0.01
+
+
+def test_an_arm_is_not_pickled_but_says_that_each_process_makes_it():
+    robot = load("panda")
+    with pytest.raises(SpecificationError, match="expected a robot and a controller to be pickled"):
+        pickle.dumps(ArmController(robot, primitive(robot).controller(DT)))

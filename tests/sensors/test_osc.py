@@ -103,6 +103,8 @@ def test_stamps_are_the_first_number_where_that_is_said(sender_to):
     source = OscSource(port=0, address="/hand", stamped=True)
     sender_to(source).send_message("/hand", [12.5, 1.0, 2.0])
     assert _received(source)[:2] == ([12.5], [[1.0, 2.0]])
+    sender_to(source).send_message("/hand", [13.0, 1.0, 2.0, 3.0])
+    assert _received(source)[2] == [("other values", "expected 3 numbers in '/hand', got 4 values")]
     source.close()
 
 
@@ -172,13 +174,13 @@ def test_symbols_go_out_as_messages():
     ]
 
 
-def test_movements_that_are_sent_are_named_over_loopback(tmp_path, source, sender_to):
-    """All samples of a movement at once, with their times: as fast as they can be read."""
-    stamped, heard = OscSource(port=0, stamped=True), []
-    sender, rows = sender_to(stamped), take("GShape")
-    done = threading.Event()
+def test_movements_that_are_sent_are_named_over_loopback(tmp_path, sender_to):
+    """All samples of a movement at once, with their times; what cannot be used comes first."""
+    heard, told, rows, done = [], [], take("GShape"), threading.Event()
 
     def send():
+        sender.send_message("/status", [1.0, 0.0])
+        sender.send_message("/hand", [1.0, 2.0, 3.0, 4.0])
         for k, row in enumerate(rows.tolist()):
             sender.send_message("/hand", [k / 100, *row])
             done.wait(0.001)
@@ -193,9 +195,17 @@ def test_movements_that_are_sent_are_named_over_loopback(tmp_path, source, sende
             done.set()
 
     with make_library(tmp_path / "actions") as library:
-        listener = Listener(library, print)
+        listener = Listener(library, told.append)
+        stamped = OscSource(port=0, stamped=True, refusal=listener.refusal)
+        sender = sender_to(stamped)
         sending = threading.Thread(target=send)
         sending.start()
         listen(listener, stamped, [Heard()], 60.0)
         sending.join()
     assert [symbol.name for symbol in heard if symbol.is_over] == ["GShape"]
+    assert listener.summary.problems["other columns"] == 2
+    assert told[:2] == [
+        "other columns: expected 2 values a sample, as the library has them, got 1; choose them with --columns; this "
+        "message to '/status' is left out",
+        "listening to the address '/hand', with 3 numbers",
+    ]

@@ -54,6 +54,17 @@ def test_a_drawing_is_named_while_it_is_drawn_and_at_its_end(client, folder):
         assert _draw(socket, 3)["label"] == "kind 3"
 
 
+def test_a_message_of_several_words_is_done_samples_first_and_then_its_end(client):
+    later = (np.array(samples(1)) + np.array([10.0, 0.0, 0.0])).tolist()
+    with client.websocket_connect(LIVE) as socket:
+        for samples_first, samples_then in ((samples(2), later), (samples(3), samples(0))):
+            socket.send_json({"finish": True, "samples": samples_first, "reset": False})
+            socket.send_json({"samples": samples_then, "reset": True, "finish": True})
+        socket.send_json({"name": 7})  # refused, so that whoever waits for an answer more gets an error
+        assert [_said(socket, "answer")["label"] for _ in range(4)] == ["kind 2", "kind 1", "kind 3", "kind 0"]
+        assert "expected a name" in _said(socket, "error")
+
+
 def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(client, folder):
     rows = np.array(samples(1)) * [0.4, 1, 1]
     with ActionLibrary(folder, read_only=True) as library:
@@ -114,6 +125,8 @@ NONSENSE = [
     '{"samples": [[0, 1' + "0" * 500 + ", 2]]}",
     '{"reset": 1}',
     '{"finish": "yes"}',
+    '{"samples": [[9, 1, 2]], "finish": "yes"}',
+    '{"finish": true, "samples": [[0]]}',
     '{"__proto__": 1}',
     '{"name": 7}',
     '{"name": "  "}',

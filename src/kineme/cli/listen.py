@@ -51,7 +51,8 @@ listening_options = under(
 @heading("OSC")
 @click.option("--port", type=click.IntRange(1, 65535), default=9000, show_default=True, help="UDP port to listen at.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; OSC knows no passwords.")
-@click.option("--address", help="Address of the messages, as /hand.  [default: that of the first with numbers]")
+@click.option("--address", help="Address of the messages, as /hand.  [default: that of the first that the "
+              "library can use]")  # fmt: skip
 @click.option("--stamped", is_flag=True, help="The first number of a message is its time [s].")
 @click.option("--send-to", type=Parsed("host:port", _place), default="127.0.0.1:9001", show_default=True,
               help="Where symbols go.")  # fmt: skip
@@ -74,12 +75,13 @@ def listen(folder: Any, source: str, sinks: tuple[str, ...], **options: Any) -> 
     if useless := given_options(every - used):
         raise click.UsageError(f"expected --from or --to with the protocol of {', '.join(useless)}")
 
-    def connected(_: Any) -> list[Any]:
+    def connected(_: Any, refusal: Callable[[Any], str]) -> list[Any]:
         receivers = [
             adapter.sink(**{name: options[name] for name in adapter.gives}, same_clock=protocol == source)
             for protocol, adapter in outward.items()
         ]
-        return [inward.source(**{name: options[name] for name in inward.takes}), *receivers]
+        given = {**options, "refusal": refusal}
+        return [inward.source(**{name: given[name] for name in inward.takes}), *receivers]
 
     _run(folder, options, connected)
 
@@ -111,7 +113,7 @@ def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> No
     if (topic is None) == (frame is None):
         raise click.UsageError("expected one of --topic and --frame")
 
-    def connected(library: Any) -> list[Any]:
+    def connected(library: Any, _: Any) -> list[Any]:
         from kineme.planning.preview import plan_symbol
         from kineme.robots.models.robot import load
         from kineme.sensors.ros import ArmClient, RosNode
@@ -126,8 +128,11 @@ def ros(folder: Any, topic: str | None, frame: str | None, **options: Any) -> No
     _run(folder, options, connected)
 
 
-def _run(folder: Any, options: dict[str, Any], connected: Callable[[Any], list[Any]]) -> None:
-    """Listen to the source that is connected first, with the sinks behind it, until Ctrl-C; say what it was."""
+def _run(folder: Any, options: dict[str, Any], connected: Callable[[Any, Callable[[Any], str]], list[Any]]) -> None:
+    """Listen to the source that is connected first, with the sinks behind it, until Ctrl-C; say what it was.
+
+    It is connected with the library and with what refuses columns that cannot be used.
+    """
     from kineme.sensors.listen import Listener, listen
 
     def tell(sentence: str) -> None:
@@ -135,7 +140,7 @@ def _run(folder: Any, options: dict[str, Any], connected: Callable[[Any], list[A
 
     with opened(folder) as library:
         listener = Listener(library, tell, options["rest"], options["columns"])
-        source, *sinks = connected(library)
+        source, *sinks = connected(library, listener.refusal)
         sinks.append(_Screen(options["as_json"], options["only_ended"]))
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
         try:

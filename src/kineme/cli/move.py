@@ -140,6 +140,7 @@ def move(**options: Any) -> None:
     from kineme.errors import heard_warnings
     from kineme.reporting.table import to_text
     from kineme.robots.execution.preflight import checks_as_data, preflight_table
+    from kineme.robots.export_files import not_in_goal
     from kineme.robots.models.robot import load
     from kineme.robots.planning.robot_movement import InfeasibleError, duration_in_words
 
@@ -178,6 +179,8 @@ def move(**options: Any) -> None:
         say(options["as_json"], data, lambda: f"{to_text(preflight_table(report))}\n{summary}")
     if not report.passed:
         write(f"warning: checks FAILED: {len(report.failed)}; written because of --force", err=True)
+    if options["action_goal"] is not None and (note := not_in_goal(movement.trajectory)):
+        write(f"note: {note}", err=True)
     write_files(movement, options)
     if not options["as_json"] and not on_screen:
         named = ", ".join(str(options[name]) for name in (*_FILES, "lerobot") if options[name] is not None)

@@ -65,16 +65,17 @@ def skills(  # noqa: PLR0913, PLR0917 - one parameter per option
 def written_to(folder: Path) -> Callable[..., str]:
     """Return what writes each movement into a new file of a folder, numbered on from those that are there."""
     from kineme.reporting.atomic import whole_file
-    from kineme.robots.export_files import write_action_goal
+    from kineme.robots.export_files import not_in_goal, write_action_goal
 
     def execute(name: str, movement: Any) -> str:
         numbers = [int(match[0]) for path in folder.iterdir() if (match := re.match(r"[0-9]{4,9}", path.name))]
         path = folder / f"{max(numbers, default=0) + 1:04d}-{name}.yaml"
         with whole_file(path, replace=False) as beside:
             write_action_goal(beside, movement.trajectory)
+        note = not_in_goal(movement.trajectory)
         return (
             f"Wrote {path.name}, an action goal of {movement.trajectory.duration:.2f} s for ROS 2. The next movement "
-            "begins where this one ends: send them in order."
+            f"begins where this one ends: send them in order.{note and f' Note: {note}.'}"
         )
 
     return execute

@@ -20,6 +20,7 @@ from kineme.planning.skill import Excess, Skill, move_to, outside, skill_of
 from kineme.reporting.colors import BLUE, GRAY, ORANGE
 from kineme.reporting.figures import encode_figure, new_figure
 from kineme.reporting.text import drawable, printable, shortened
+from kineme.robots.export_files import not_in_goal
 from kineme.robots.kinematics.descent import PLANES, kinematics
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.move import move
@@ -65,6 +66,7 @@ class Preview(NamedTuple):
             report, words = self.movement.preflight, duration_in_words(self.movement)
             lines.append(f"The arm {arm} can execute it, all {len(report.checks)} checks passed: {words}.")
             lines += [f"Not checked: {printable(sentence)}." for sentence in report.unchecked]
+            lines += [f"Note: {clean(note, 500)}" for note in [not_in_goal(self.movement.trajectory)] if note]
         return "\n".join([*lines, *(f"Note: {clean(note, 500)}" for note in self.notes)])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import Flag, auto
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -147,6 +147,12 @@ class ArmController:
         self._start = self._nearest_start() if start is None else as_point("start", start, robot.joints)
         self._waits = controller.options.feedback == "phase"
         self.reset()
+
+    def __reduce__(self) -> NoReturn:
+        raise SpecificationError(
+            "expected a robot and a controller to be pickled or copied, got the arm controller over both; make it in "
+            "each process: ArmController(robot, controller)"
+        )
 
     def reset(self) -> ArmState:
         """Back to the start, movement and joints; returns the state there."""

@@ -16,6 +16,7 @@ from kineme.errors import DataError, SpecificationError
 from kineme.io.lerobot.write_episode import write_episode
 from kineme.io.writing.write_movement import ColumnNames, Columns, encode_movement, write_movement
 from kineme.reporting.atomic import whole_file, whole_folder, write_atomically
+from kineme.reporting.text import printable
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.roles import DRIVERS, JOINT_UNITS
@@ -154,6 +155,14 @@ def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
     points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(rows))  # there are no texts in them but their keys
     text = f'{{"trajectory": {{"joint_names": {json.dumps(trajectory.joints)}, "points": {points}}}}}\n'
     return write_atomically(Path(path), text.encode())
+
+
+def not_in_goal(trajectory: JointTrajectory) -> str:
+    """Say which channels beside the joints an action goal does not hold; empty where there are none."""
+    if not trajectory.steps:
+        return ""
+    names = json.dumps(printable(", ".join(trajectory.steps)), ensure_ascii=False)  # of a library: data, in quotes
+    return f"the steps of {names} are not in an action goal, which is of joints alone; send them yourself"
 
 
 def write_joints(path: str | Path, trajectory: JointTrajectory) -> Path:

@@ -401,10 +401,10 @@ def brake(robot: Robot, trajectory: JointTrajectory, at: float) -> JointTrajecto
             torques.of(*sample) for sample in zip(path.positions[::_LOOKS], v[::_LOOKS], a[::_LOOKS], strict=True)
         )
         if (np.abs(a) <= _SLACK * robot.acceleration).all() and not any(map(torques.exceeded, needed)):
-            return replace(path, times=times, velocities=v, accelerations=a, units=trajectory.units)
+            return replace(path, times=times, velocities=v, accelerations=a)
         ramp *= _LONGER
     times = np.append(np.arange(at, trajectory.duration - _STEP / 2, _STEP), trajectory.duration)
-    return replace(between(trajectory, times), times=times - at, units=trajectory.units)
+    return replace(between(trajectory, times), times=times - at)
 
 
 def _run_of(robot: Robot, samples: list[_Sample], stopped: float | None, names: tuple[str, ...]) -> Run:

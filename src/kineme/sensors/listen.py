@@ -218,6 +218,14 @@ class Listener:
             good &= unit
         return block.times[good], rows[good]
 
+    def refusal(self, columns: Columns) -> str:
+        """Say why samples of these columns cannot be used; empty of those that can."""
+        try:
+            self._as_learned(np.zeros((1, len(columns.heads))), columns)
+        except KinemeError as error:
+            return str(error)
+        return ""
+
     def _as_learned(self, rows: Array, columns: Columns) -> Array:
         """Return rows in the columns, the order and the units of the library."""
         heads, units = columns

@@ -139,14 +139,18 @@ class LslSink:
 class OscSource:
     """Samples from messages to one address, as ``/hand 0.1 0.2 0.3``, by default that of the first with numbers.
 
-    `stamped`: the first number of a message is its time [s]; else samples have the time at which they come. A
-    `DataError` says that python-osc is not installed, or that the port is taken.
+    `stamped`: the first number of a message is its time [s]; else samples have the time at which they come. `refusal`
+    says of columns why they cannot be used, nothing of those that can: such messages choose neither the address nor how
+    many numbers are expected. A `DataError` says that python-osc is not installed, or that the port is taken.
     """
 
-    def __init__(self, port: int = PORT, host: str = LOOPBACK, address: str | None = None, stamped: bool = False):
+    def __init__(
+        self, port: int = PORT, host: str = LOOPBACK, address: str | None = None, stamped: bool = False,
+        refusal: Callable[[Columns], str] = lambda _: "",
+    ) -> None:  # fmt: skip
         with needs("python-osc", "read OSC", "osc"):
             import pythonosc.osc_packet  # noqa: F401
-        self._address, self._stamped = address, stamped
+        self._address, self._stamped, self._refusal = address, stamped, refusal
         self._opened = time.monotonic()  # stamps count from here: numbers of OSC have seven digits
         self.columns: Columns | None = None
         self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
@@ -180,25 +184,27 @@ class OscSource:
         return Block(np.array(times), np.array(rows), notes, own_stamps=self._stamped)
 
     def _rows(self, datagram: bytes, notes: list[tuple[str, str]]) -> Iterator[list[float]]:
-        """Yield the numbers of each message to the address, as many as in the first one."""
+        """Yield the numbers of each message to the address, as many as in the first one that can be used."""
         from pythonosc.osc_packet import OscPacket
 
         for _, message in OscPacket(datagram).messages:
             values = list(message)
-            is_row = 0 < len(values) - self._stamped <= _MOST_VALUES
-            is_row = is_row and all(type(value) in {int, float} for value in values)
-            if self._address is None and is_row:
-                self._address = message.address
-                notes.append(("", f"listening to the address {message.address!r}, with {len(values)} numbers"))
+            width = len(values) - self._stamped
+            is_row = 0 < width <= _MOST_VALUES and all(type(value) in {int, float} for value in values)
+            if self.columns is None and is_row and self._address in {None, message.address}:
+                columns = Columns(tuple(f"value{k}" for k in range(width)), (None,) * width)
+                if why := self._refusal(columns):
+                    notes.append(("other columns", f"{why}; this message to {message.address!r} is left out"))
+                    continue
+                if self._address is None:
+                    notes.append(("", f"listening to the address {message.address!r}, with {len(values)} numbers"))
+                self._address, self.columns = message.address, columns
             if message.address != self._address:
                 notes.append(("other address", f"messages to {message.address!r} are left out; --address chooses"))
                 continue
-            width = len(values) - self._stamped
-            if self.columns is None and is_row:
-                self.columns = Columns(tuple(f"value{k}" for k in range(width)), (None,) * width)
             if not is_row or self.columns is None or width != len(self.columns.heads):
-                expected = "numbers" if self.columns is None else f"{len(self.columns.heads)} numbers"
-                notes.append(("other values", f"expected {expected} in {self._address!r}, got {len(values)} values"))
+                n = "" if self.columns is None else f"{len(self.columns.heads) + self._stamped} "
+                notes.append(("other values", f"expected {n}numbers in {self._address!r}, got {len(values)} values"))
                 continue
             yield [float(value) for value in values]
 
@@ -242,5 +248,5 @@ class Adapter(NamedTuple):
 
 ADAPTERS = {
     "lsl": Adapter(LslSource, ("name", "kind", "lan"), LslSink, ("names", "lan")),
-    "osc": Adapter(OscSource, ("port", "host", "address", "stamped"), OscSink, ("send_to",)),
+    "osc": Adapter(OscSource, ("port", "host", "address", "stamped", "refusal"), OscSink, ("send_to",)),
 }

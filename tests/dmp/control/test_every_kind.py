@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+import pickle
 
 import numpy as np
 import pytest
@@ -314,6 +316,17 @@ def test_a_pose_says_where_it_is_and_how_it_is_turned():
     np.testing.assert_array_equal(state.pose, state.position)
     np.testing.assert_array_equal(state.orientation, state.position[3:])
     assert angle_between(state.orientation, TURN[0]) < 0.1
+
+
+def test_a_controller_is_pickled_on_its_way_and_goes_on(moving, twin):
+    going = moving.controller(0.01, goal_filter=0.1)
+    for _ in range(20):
+        going.step(goal=other_goal(moving))
+    copies = pickle.loads(pickle.dumps(going)), copy.deepcopy(going)
+    expected = states_of(going, 30)
+    for other in copies:
+        for ours, theirs in zip(states_of(other, 30), expected, strict=True):
+            np.testing.assert_array_equal(np.hstack(ours[:6]), np.hstack(theirs[:6]))
 
 
 def test_a_controller_is_made_from_a_plan():

@@ -20,7 +20,7 @@ from kineme.dmp.control.plan import (
     numbers,
     passed,
 )
-from kineme.dmp.control.stepping import stepper
+from kineme.dmp.control.stepping import Advance, stepper
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
 from kineme.validation import Array, check_number
@@ -51,6 +51,7 @@ class Controller(Generic[S]):
     Notes
     -----
     Its twin, compiled unless `KINEME_COMPILED=never`, is warmed up when it is made. It belongs to one thread.
+    Pickled or copied, it goes on from where it is.
     """
 
     state: S
@@ -73,9 +74,20 @@ class Controller(Generic[S]):
         )
         self._limited = any(limit is not None for limit in self._limits)
         self._settle = float(options.settle or plan.settle)
-        self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
+        self._advance = self._stepper()
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
         self.reset()
+
+    def _stepper(self) -> Advance:
+        return stepper(self._plan, self.options.avoidance or ObstacleAvoidance())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but the compiled code, which every process has of its own."""
+        return {name: value for name, value in vars(self).items() if name != "_advance"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._advance = self._stepper()
 
     def reset(self) -> S:
         """Back to the start, with the first goal; returns the state there."""

@@ -142,7 +142,7 @@ class Plan:
 
     dmp: Any  # the specification: stiffness, damping, and the terms from which `shape` is mixed
     mixing: Array  # (N + 1, d + 1), from basis functions and coupling to `shape`
-    ratio: Callable[[Array], Array]  # of a goal (d,); not finite where the formulation cannot go
+    ratio: Callable[[Array], Array]  # of a goal (d,), no lambda: plans are pickled; not finite where it cannot go
     origin: Array  # (d,), from where positions and goals count; x0 of a discrete movement
     goal: Array  # (d,), the first goal
     state: Array  # (2, d), the first position and dx/du

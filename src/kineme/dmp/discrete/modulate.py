@@ -25,7 +25,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -425,6 +425,11 @@ def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tupl
     return z
 
 
+def _ratio(dmp: Specification, learned: Array, extents: Array, goal: Array) -> Array:
+    """What scale f of one movement is multiplied by for a goal (d,)."""
+    return np.array(dmp.system.ratio(goal[None], learned, extents)[0])
+
+
 def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
     """The plan of one generated movement through via points, with that many positions, others behind them."""
     check_one(len(movement))
@@ -439,7 +444,7 @@ def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Pl
     return Plan(
         dmp,
         mixing,
-        ratio=lambda goal: np.array(dmp.system.ratio(goal[None], learned, extents)[0]),
+        ratio=partial(_ratio, dmp, learned, extents),
         origin=x0,
         goal=movement.goals[0] - x0,
         state=np.vstack((np.zeros(d), movement.velocities_at_start[0] * tau)),

@@ -278,7 +278,7 @@ class RhythmicPrimitives(Batch):
         movement = modulated(rollout(self, settings, 1.0, None, n_samples=2), targets)
         check_one(len(movement))
         origin, tau, gain = movement.baselines[0].copy(), float(movement.periods[0]), float(movement.ratio[0])
-        size, ones = 2.0 * abs(gain) * float(self.amplitudes[0]), np.ones(d)
+        size = 2.0 * abs(gain) * float(self.amplitudes[0])
         if movement.change is not None:
             weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
         mixing = np.zeros((dmp.n_basis + 1, d + 1))
@@ -286,7 +286,7 @@ class RhythmicPrimitives(Batch):
         plan = Plan(  # a discrete movement whose shape repeats around its baseline
             dmp,
             mixing,
-            ratio=lambda goal: ones,
+            ratio=np.ones_like,
             origin=origin,
             goal=np.zeros(d),
             state=np.vstack((movement.positions[0, 0] - origin, movement.velocities[0, 0] * tau)),

@@ -13,7 +13,7 @@ from functools import wraps
 from numbers import Integral
 from pathlib import Path
 from threading import Lock, RLock
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage import connection as sqlite
@@ -86,6 +86,12 @@ class Store:
                 self._reader.close()
                 raise
             safety.register(self)
+
+    def __reduce__(self) -> NoReturn:
+        raise SpecificationError(
+            f"expected the folder or address of a library, got the open one in {self.folder} to be pickled or copied; "
+            "pass that, and open it in each process: kineme.ActionLibrary(folder)"
+        )
 
     @classmethod
     def exists(cls, path: Any, wait: float = 10.0) -> bool:

@@ -12,7 +12,7 @@ from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PPoly
 
 from kineme.errors import DataError, SpecificationError
 from kineme.robots.models.robot import Robot
-from kineme.validation import Array
+from kineme.validation import Array, as_numbers
 
 _KNOTS_APART = 1e-3  # between two knots of the path: of what joints at their limits of velocity pass in a second
 _KNOTS = 500, 5000  # of the path at least, and at most
@@ -53,7 +53,11 @@ class JointTrajectory:
     units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", tuple(self.joints))
         object.__setattr__(self, "units", tuple(self.units) or ("rad",) * len(self.joints))
+        for name in ("times", "positions", "velocities", "accelerations"):
+            object.__setattr__(self, name, as_numbers(getattr(self, name), name))
+        object.__setattr__(self, "steps", {name: as_numbers(values, name) for name, values in self.steps.items()})
 
     @property
     def duration(self) -> float:
@@ -89,7 +93,9 @@ def between(trajectory: JointTrajectory, times: Array) -> JointTrajectory:
     path = _path(trajectory)
     held = np.searchsorted(trajectory.times, times, "right") - 1
     steps = {name: values[held] for name, values in trajectory.steps.items()}
-    return JointTrajectory(trajectory.joints, times, path(times), path(times, 1), path(times, 2), steps)
+    return JointTrajectory(
+        trajectory.joints, times, path(times), path(times, 1), path(times, 2), steps, trajectory.units
+    )
 
 
 class Extreme(NamedTuple):

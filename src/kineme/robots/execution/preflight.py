@@ -67,16 +67,10 @@ def preflight(
     Raises
     ------
     TrajectoryError
-        A trajectory of other joints, of numbers that are not finite, or whose times do not increase.
+        A trajectory of other joints, of joints in another order or other units; with steps that are not as many as
+        its samples; of numbers that are not finite; or whose times do not increase from 0.
     """
-    shape = (max(2, len(trajectory)), robot.n_joints)
-    arrays = {name: getattr(trajectory, name) for name in ("positions", "velocities", "accelerations")}
-    for name, values in arrays.items():
-        if values.shape != shape:
-            raise TrajectoryError(f"expected {name} of shape {shape}, samples and joints, got {values.shape}")
-    finite = all(np.isfinite(values).all() for values in (trajectory.times, *arrays.values()))
-    if not finite or not np.all(np.diff(trajectory.times) > 0):
-        raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
+    _refuse_others(robot, trajectory)
     times = dense_times(robot, trajectory)
     dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
     state = along(robot, dense)
@@ -85,6 +79,29 @@ def preflight(
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
     return Preflight(tuple(checks), tuple(_unchecked(robot)))
+
+
+def _refuse_others(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Refuse what is no trajectory of this arm, or cannot be checked."""
+    for name in ("joints", "units"):
+        expected, got = (", ".join(getattr(of, name)) for of in (robot, trajectory))
+        if got != expected:
+            raise TrajectoryError(
+                f"expected the {name} of {robot.name}, {expected}, in this order, got {got or 'none'}; "
+                "order its columns so, or convert them"
+            )
+    n = max(2, trajectory.times.size)
+    arrays = {name: getattr(trajectory, name) for name in ("positions", "velocities", "accelerations")}
+    for name, values in arrays.items():
+        if values.shape != (shape := (n, robot.n_joints)):
+            raise TrajectoryError(f"expected {name} of shape {shape}, samples and joints, got {values.shape}")
+    one_each = {"times": trajectory.times} | {f"steps of {name}": x for name, x in trajectory.steps.items()}
+    for name, values in one_each.items():
+        if values.shape != (n,):
+            raise TrajectoryError(f"expected {name} of shape {(n,)}, one for each sample, got {values.shape}")
+    finite = all(np.isfinite(values).all() for values in (*arrays.values(), *one_each.values()))
+    if not finite or trajectory.times[0] != 0 or not np.all(np.diff(trajectory.times) > 0):
+        raise TrajectoryError("expected a trajectory of finite numbers, whose times increase from 0")
 
 
 def _at_limits(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:

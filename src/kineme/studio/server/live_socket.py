@@ -40,6 +40,8 @@ _WORDS = (
     '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true}, {"hand": {"points": ...}}, '
     '{"name": "..."} or {"watch": true}'
 )
+_NO_WORDS = "wrong", f"expected {_WORDS}; got something else"
+_FIELDS = "watch", "name", "hand", "reset", "samples", "finish"  # of a message, in the order in which they are done
 _LANDMARKS = 21  # of a hand, as MediaPipe numbers them
 _ASPECT = 4 / 3  # of the picture of a camera that does not say how wide it is
 
@@ -119,7 +121,8 @@ class _Client:
             if message["type"] == "websocket.disconnect":
                 await self._waiting.put(("end", None))
                 return
-            await self._waiting.put(_parsed(message))
+            for received in _parsed(message):
+                await self._waiting.put(received)
 
     async def answer_all(self) -> None:
         """Answer to one message after the other, until the client goes."""
@@ -187,22 +190,23 @@ class _Client:
             await self.socket.send_text(text)
 
 
-def _parsed(message: Any) -> _Received:
+def _parsed(message: Any) -> list[_Received]:
+    """Return what a message holds, in the order in which it is done; nothing of one of which a part is wrong."""
+    received: list[_Received] = []
     try:
         content = json.loads(message.get("text") or "")
-    except (ValueError, RecursionError):
-        return "wrong", f"expected JSON: {_WORDS}; got something else"
-    content = content if isinstance(content, dict) else {}
-    try:
-        for field, parse in _PARSED.items():
-            if field in content:
-                return field, parse(content[field])
+        for field in _FIELDS if isinstance(content, dict) else ():
+            if field in _PARSED and field in content:
+                received.append((field, _PARSED[field](content[field])))
+            elif content.get(field, False) is True:
+                received.append((field, None))
+            elif content.get(field, False) is not False:
+                return [_NO_WORDS]
     except TrajectoryError as error:
-        return "wrong", str(error)
-    for command in ("finish", "reset", "watch"):
-        if content.get(command) is True:
-            return command, None
-    return "wrong", f"expected {_WORDS}; got something else"
+        return [("wrong", str(error))]
+    except (ValueError, RecursionError):
+        return [("wrong", f"expected JSON: {_WORDS}; got something else")]
+    return received or [_NO_WORDS]
 
 
 class LiveSession:
