@@ -168,6 +168,10 @@ def test_points_are_told_by_the_ends_of_names():
     assert list(points) == ["", "left"]
     np.testing.assert_array_equal(points["left"], values[:, 2:5])
     assert points_in(("eef_rot.x", "eef_rot.y", "eef_rot.z", "z", "max"), values[:, :5]) == {}
+    assert (
+        points_in(("Accelerometer.x", "Accelerometer.y", "Accelerometer.z", "gravity x", "gravity y"), values[:, :5])
+        == {}
+    )
 
 
 def test_episodes_and_movements_are_scenes():

@@ -16,6 +16,7 @@ from kineme.io.reading.merge_files import Recordings
 from kineme.io.records import UNKNOWN, needs
 from kineme.io.writing.annotations import Annotation
 from kineme.io.writing.write_movement import ColumnNames, Columns, columns_of
+from kineme.movements.channels.detect import NO_PLACES
 from kineme.movements.episodes import Episode
 from kineme.movements.tables.time_stamps import words_of
 from kineme.movements.trajectories.movements import axis_names
@@ -40,9 +41,9 @@ _PLOTS = 6  # plots of one scene; features beyond share one
 _TABS = 50  # scenes with a view of their own; the tree of the viewer has all
 _AXIS = re.compile(r"(?:(.*)[._/ -])?([xyz])", re.IGNORECASE)
 #: Words of what has three entries and is no point.
-_DIRECTIONS = frozenset(
-    {"quat", "quaternion", "orientation", "rot", "rotation", "rotvec", "axis", "angle", "rpy", "euler", "velocity",
-     "vel", "v", "acceleration", "acc", "accel", "gyro", "angular", "force", "torque", "wrench", "effort", "scale"}
+_DIRECTIONS = NO_PLACES | frozenset(
+    {"quat", "quaternion", "orientation", "rot", "rotation", "rotvec", "axis", "angle", "rpy", "v", "angular", "wrench",
+     "scale"}
 )  # fmt: skip
 
 

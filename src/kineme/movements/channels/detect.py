@@ -385,7 +385,7 @@ def _order_of(heads: Sequence[str], q: Array, offsets: NDArray[np.intp]) -> str:
 #: Sensors of motion, as heads of columns and names of files say them.
 SENSORS = frozenset({"accelerometer", "gyroscope", "gyro", "magnetometer", "gravity", "barometer"})
 #: Columns with one of them are no places, though they have three axes.
-_NO_PLACES = OTHER_QUANTITIES - {"load", "loads"} | SENSORS | {"imu", "mag", "magnetic", "emg", "euler"}
+NO_PLACES = OTHER_QUANTITIES - {"load", "loads"} | SENSORS | {"imu", "mag", "magnetic", "emg", "euler"}
 _SIDES = ({"l", "r"}, {"left", "right"})  # lx beside rx; without it rx is a rotation
 
 
@@ -426,7 +426,7 @@ def _names_and_axes(channels: Channels) -> list[tuple[str, str]]:
     if {"_".join(words)[:-1] for words in of_columns} in _SIDES:
         of_columns = [(words[0][:-1], words[0][-1]) for words in of_columns]
     return [
-        _name_and_axis(words) if channel.kind == "position" and not {*words} & _NO_PLACES else ("", "")
+        _name_and_axis(words) if channel.kind == "position" and not {*words} & NO_PLACES else ("", "")
         for channel, words in zip(channels, of_columns, strict=True)
     ]
 
