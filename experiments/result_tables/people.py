@@ -22,7 +22,7 @@ EARLIER = {
     "multistrokes2d": "symbols of several strokes",
     "exercises6d": "exercises, a sensor at the wrist",
 }
-SPOTTED = ("with rests", "without", "with rests, among unknown", "without, among unknown")
+SPOTTED = ("with rests", "without", "with rests, among unknown", "without, among unknown", "with rests, noise 3 %")
 
 
 def tables() -> dict[str, dict[str, str]]:

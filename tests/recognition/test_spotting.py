@@ -86,7 +86,7 @@ def _frames(segments, times):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("noise", [0.0, 0.005])
+@pytest.mark.parametrize("noise", [0.0, 0.005, 0.1])
 def test_known_movements_are_found_where_they_are(seed, noise):
     order = np.random.default_rng(seed).permutation(KNOWN).tolist()
     recording, truth = _stream(seed, order, noise)

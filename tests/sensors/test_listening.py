@@ -70,6 +70,16 @@ def test_movements_between_rests_are_named_before_and_when_they_are_over(library
         assert heard.symbols[first].certainty == "looks like"
 
 
+def test_a_sensor_that_trembles_rests_too(library):
+    """The extent of white noise in the time of a rest was motion: every movement was cut at the longest duration."""
+    rows = session("GShape", "WShape")
+    size = np.ptp(take("Sine"), axis=0).max()
+    heard = Heard(library).feed(rows + 0.01 * size * np.random.default_rng(0).normal(size=rows.shape))
+    names = [symbol.name for symbol in heard.symbols if symbol.is_over and symbol.certainty != "new"]
+    assert names == ["GShape", "WShape"]
+    assert "no rest" not in heard.listener.summary.problems
+
+
 def test_start_and_end_are_those_of_the_motion_and_the_decision_comes_a_rest_later(library):
     heard = Heard(library).feed(take("Sine", rest=1.0))
     (symbol,) = [symbol for symbol in heard.symbols if symbol.is_over]

@@ -1,7 +1,7 @@
 """Compiled distances of pairs, twins of those in ``pair_distances.py``: 16 at once.
 
 A block holds 16 movements, one in each lane. Its rows are the numbers of a movement's shape, one array after the other,
-as `begins_of` says, each times the root of its weight. The tuple `dims` is as long as a movement has dimensions: its
+as `Work` says, each times the root of its weight. The tuple `dims` is as long as a movement has dimensions: its
 type tells the compiler that number.
 """
 
@@ -54,17 +54,19 @@ def fill_grid(dims, sides, by_rows, numbers, rotations, squares):  # type: ignor
     (many, few), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     n_many, n_few = (n, m) if by_rows else (m, n)
-    work, chosen = new_work(dims, sizes), np.zeros(LANES, np.intp)
+    work, chosen = new_work(np.intp(len(dims)), sizes), np.zeros(LANES, np.intp)
     packed, repeated = (work.a, work.b) if by_rows else (work.b, work.a)
     for start in range(0, n_many, LANES):
         width = _choose(start, n_many, chosen)
-        pack(dims, many, chosen, numbers, packed)
+        pack(work.begins, many, chosen, numbers, packed)
+        _add_halves(dims, work.begins, numbers, packed)
         for k in range(n_few):
             if n_few > 1 or start == 0:
-                pack_everywhere(dims, few, k, numbers, repeated)
+                pack_everywhere(work.begins, few, k, numbers, repeated)
+                _add_halves(dims, work.begins, numbers, repeated)
             for lane in range(LANES):
                 i, j = (chosen[lane], k) if by_rows else (k, chosen[lane])
-                take_rotation(dims, rotations, i, j, work.rotation, lane)
+                take_rotation(rotations[i, j], work.d, work.rotation, lane)
             _compare(dims, sizes, work)
             for part in range(3):
                 for lane in range(width):
@@ -77,15 +79,17 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
     """``squares[:, k]`` of listed pairs, two arrays of indices; rotations (n_pairs, 1, r)."""
     (A, B), (_, sizes) = sides, numbers
     n_pairs = len(pairs[0])
-    work, first, second = new_work(dims, sizes), np.zeros(LANES, np.intp), np.zeros(LANES, np.intp)
+    work, first, second = new_work(np.intp(len(dims)), sizes), np.zeros(LANES, np.intp), np.zeros(LANES, np.intp)
     for start in range(0, n_pairs, LANES):
         width = min(LANES, n_pairs - start)
         for lane in range(LANES):
             k = start + min(lane, width - 1)
             first[lane], second[lane] = pairs[0][k], pairs[1][k]
-            take_rotation(dims, rotations, k, 0, work.rotation, lane)
-        pack(dims, A, first, numbers, work.a)
-        pack(dims, B, second, numbers, work.b)
+            take_rotation(rotations[k, 0], work.d, work.rotation, lane)
+        pack(work.begins, A, first, numbers, work.a)
+        _add_halves(dims, work.begins, numbers, work.a)
+        pack(work.begins, B, second, numbers, work.b)
+        _add_halves(dims, work.begins, numbers, work.b)
         _compare(dims, sizes, work)
         for k in range(3):
             for lane in range(width):
@@ -97,16 +101,18 @@ def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # typ
     """``squares[:2, i, j]`` as `elastic_bounds`, ``squares[2, i, j]`` of clouds if there is room; 16 of A at once."""
     (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
-    work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
+    work, first = new_work(np.intp(len(dims)), sizes), np.zeros(LANES, np.intp)
     for start in range(0, n, LANES):
         width = _choose(start, n, first)
-        pack(dims, A, first, numbers, work.a)
+        pack(work.begins, A, first, numbers, work.a)
+        _add_halves(dims, work.begins, numbers, work.a)
         for j in range(m):
             for lane in range(LANES):
-                take_rotation(dims, rotations, first[lane], j, work.rotation, lane)
+                take_rotation(rotations[first[lane], j], work.d, work.rotation, lane)
             _bound(dims, B, j, numbers, every_segment, work)
             if len(squares) == 3:
-                pack_everywhere(dims, B, j, numbers, work.b)
+                pack_everywhere(work.begins, B, j, numbers, work.b)
+                _add_halves(dims, work.begins, numbers, work.b)
                 rotate(dims, sizes, work)
                 _match(dims, sizes, work)
             for k in range(len(squares)):
@@ -128,7 +134,7 @@ def _bound(dims, shapes, j, numbers, every_segment, work):  # type: ignore[no-un
     """Sums of the least costs of some segments of movement j."""
     weights, sizes = numbers
     (n_segments, band, _), d, a, other = sizes, len(dims), work.a, work.b
-    _, midpoints, angles = begins_of(dims, sizes)[:3]
+    _, midpoints, angles = work.begins[:3]
     matrix = load_matrix(work.rotation, 0, dims)
     elastic, turning = every(np.float32(0)), every(np.float32(0))
     for q in range(every_segment // 2, n_segments, every_segment):
@@ -162,7 +168,7 @@ def _warp(dims, sizes, work):  # type: ignore[no-untyped-def]
     """Dynamic time warping of both costs, row by row of their tables; column q is kept in row q + 1 of an array."""
     a, b, turned, elastic, turning = work.a, work.b, work.turned, work.elastic, work.turning
     (n_segments, band, _), d, far = sizes, len(dims), every(_FAR)
-    _, midpoints, angles = begins_of(dims, sizes)[:3]
+    _, midpoints, angles = work.begins[:3]
     for q in range(n_segments + 1):
         store(elastic, q, far)
         store(turning, q, far)
@@ -196,7 +202,7 @@ def _match(dims, sizes, work):  # type: ignore[no-untyped-def]
     """Distances of the points of each movement to their nearest, and of those that nobody matched."""
     a, b, turned, columns, nearest = work.a, work.b, work.turned, work.columns, work.nearest
     n_points, d, zero, far = sizes[2], len(dims), every(np.float32(0)), every(_FAR)
-    points, tangents, angles, halves = begins_of(dims, sizes)[3:]
+    points, tangents, angles, halves = work.begins[3:]
     for q in range(n_points):
         store(columns, q, far)
     matched = bit(0)
@@ -237,8 +243,13 @@ def _sum_up(n_points, matched, work):  # type: ignore[no-untyped-def]
 
 
 class Work(NamedTuple):
-    """Blocks and rows of vectors that one call uses again and again."""
+    """Blocks and rows of vectors that one call uses again and again.
 
+    What needs the number of dimensions as a number only takes it from here: it is compiled once, not for each number.
+    """
+
+    d: Any  # dimensions
+    begins: Any  # first rows in a block: tangents, midpoints, angles; points, weighted tangents, angles, half squares
     a: Any  # block of the one movements
     b: Any  # and of the others
     turned: Any  # the others, rotated
@@ -252,11 +263,13 @@ class Work(NamedTuple):
 
 
 @_jit
-def new_work(dims, sizes):  # type: ignore[no-untyped-def]
-    d = len(dims)
+def new_work(d, sizes):  # type: ignore[no-untyped-def]
     n_segments, _, n_points = sizes
-    n_rows = n_segments * (2 * d + 1) + n_points * (2 * d + 2)
+    t, points, x = n_segments * d, n_segments * (2 * d + 1), n_points * d
+    n_rows = points + n_points * (2 * d + 2)
     return Work(
+        d,
+        (0, t, 2 * t, points, points + x, points + 2 * x, points + 2 * x + n_points),
         aligned(n_rows),
         aligned(n_rows),
         aligned(n_rows),
@@ -271,19 +284,9 @@ def new_work(dims, sizes):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def begins_of(dims, sizes):  # type: ignore[no-untyped-def]
-    """First rows of tangents, midpoints, turning angles; points, weighted tangents, turning angles, half squares."""
-    n_segments, _, n_points = sizes
-    t, points = n_segments * len(dims), n_segments * (2 * len(dims) + 1)
-    x = n_points * len(dims)
-    return 0, t, 2 * t, points, points + x, points + 2 * x, points + 2 * x + n_points
-
-
-@_jit
-def pack(dims, shapes, chosen, numbers, block):  # type: ignore[no-untyped-def]
+def pack(begins, shapes, chosen, numbers, block):  # type: ignore[no-untyped-def]
     """Put the movement ``chosen[lane]`` into each lane of a block."""
-    weights, sizes = numbers
-    begins = begins_of(dims, sizes)
+    weights = numbers[0]
     for part in range(6):
         rows, weight, begin = shapes[part], weights[part], begins[part]
         length = rows.shape[1]
@@ -295,25 +298,21 @@ def pack(dims, shapes, chosen, numbers, block):  # type: ignore[no-untyped-def]
             for k in range(0, length - LANES, LANES):
                 transpose(rows, chosen, k, weight, block, begin + k)
             transpose(rows, chosen, length - LANES, weight, block, begin + length - LANES)
-    _add_halves(dims, numbers, block)
 
 
 @_jit
-def pack_everywhere(dims, shapes, i, numbers, block):  # type: ignore[no-untyped-def]
+def pack_everywhere(begins, shapes, i, numbers, block):  # type: ignore[no-untyped-def]
     """Put movement i into every lane of a block."""
-    weights, sizes = numbers
-    begins = begins_of(dims, sizes)
+    weights = numbers[0]
     for part in range(6):
         row = shapes[part][i]
         for k in range(len(row)):
             store(block, begins[part] + k, every(row[k] * weights[part]))
-    _add_halves(dims, numbers, block)
 
 
 @_jit
-def _add_halves(dims, numbers, block):  # type: ignore[no-untyped-def]
+def _add_halves(dims, begins, numbers, block):  # type: ignore[no-untyped-def]
     weights, sizes = numbers
-    begins = begins_of(dims, sizes)
     factor = every(np.float32(0.5) * weights[4] * weights[4])
     for p in range(sizes[2]):
         row = begins[4] + p * len(dims)
@@ -322,14 +321,14 @@ def _add_halves(dims, numbers, block):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untyped-def]
-    d, r = len(dims), rotations.shape[2]
+def take_rotation(rotation, d, block, lane):  # type: ignore[no-untyped-def]
+    r = len(rotation)
     if r == 0:
         for k in range(d * d):
             block[k, lane] = k % (d + 1) == 0
     elif r == d * d:
         for k in range(d * d):
-            block[k, lane] = rotations[i, j, k]
+            block[k, lane] = rotation[k]
     else:  # of one point of several, which lie along the diagonal
         p = 3 if r == 9 else 2
         for k in range(d * d):
@@ -337,19 +336,19 @@ def take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untype
         for first in range(0, d, p):
             at = first * (d + 1)
             if r == 2:
-                c, s = rotations[i, j, 0], rotations[i, j, 1]
+                c, s = rotation[0], rotation[1]
                 block[at, lane], block[at + 1, lane] = c, -s
                 block[at + d, lane], block[at + d + 1, lane] = s, c
             else:
                 for k in range(p):
                     for h in range(p):
-                        block[at + k * d + h, lane] = rotations[i, j, k * p + h]
+                        block[at + k * d + h, lane] = rotation[k * p + h]
 
 
 @_jit
 def rotate(dims, sizes, work):  # type: ignore[no-untyped-def]
     """Rotate the tangents, midpoints and points of b; nothing else is written to `turned`."""
-    begins = begins_of(dims, sizes)
+    begins = work.begins
     matrix, b, turned = load_matrix(work.rotation, 0, dims), work.b, work.turned
     for first, end in ((begins[0], begins[2]), (begins[3], begins[5])):
         for row in range(first, end, len(dims)):

@@ -387,7 +387,7 @@ def surroundings(motion: Motion, bouts: Rows, rows: Rows, reach: float = 0.15) -
     """Measure the ends of windows, and the rests between; ends are far from a rest by `reach` of the duration."""
     t = motion.times
     speeds = np.minimum(motion.speed / motion.peak, 1.0)
-    still = np.append(0.0, np.cumsum(np.diff(t) * (speeds[1:] <= _SLOW)))
+    still = np.append(0.0, np.cumsum(np.diff(t) * (speeds[1:] <= max(_SLOW, 2.0 * motion.noise / motion.peak))))
     lasting = t[rows[:, 1]] - t[rows[:, 0]]
     ends = np.sort(np.concatenate((t[bouts[:, 0]], t[bouts[:, 1] - 1], [-np.inf, np.inf])))
     times = t[rows]

@@ -21,6 +21,7 @@ from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
 from kineme.movements.channels.detect import name_of
 from kineme.movements.channels.incremental import IncrementalCoordinates
+from kineme.movements.segmentation.table import noise_deviations
 from kineme.movements.trajectories.labels import Label
 from kineme.recognition.answer import Answer, Certainty
 from kineme.reporting.text import counted, first_names, printable
@@ -35,6 +36,9 @@ _STOPPED = 2.0  # seconds without samples that are said
 _AGAIN = 5.0  # seconds until the same thing is said again
 _LATENCIES = 10_000  # that are remembered
 _RECENT = 10_000  # samples within a rest that are looked at, of a sensor whose clock stands almost still
+_RUN, _RUNS = 16, 64  # samples of which noise is measured, and such runs that are remembered
+_QUIET = 0.2  # share of the runs that rest, at least: while a hand moves, its motion looks like noise, too
+_MOST_NOISE = 0.1  # of the size of a movement
 
 
 class Block(NamedTuple):
@@ -102,6 +106,33 @@ class Rests:
     rests: float = 0.03  # and that is not moved where it ends
 
 
+class Noise:
+    """Noise of a stream at rest, as large as in the quieter of its last runs of samples."""
+
+    def __init__(self, n_dims: int, most: float) -> None:
+        self._most = most
+        self._run = deque[Array](maxlen=_RUN)
+        self._new = 0  # samples since the last run
+        self._deviations = deque[Array](maxlen=_RUNS)
+        self.deviation = np.zeros(n_dims)
+
+    def take(self, coordinates: Array) -> None:
+        """Take in a sample (d,)."""
+        self._run.append(coordinates)
+        self._new += 1
+        if self._new >= _RUN:
+            self._new = 0
+            self._deviations.append(noise_deviations(np.array(self._run)))
+            self.deviation = np.minimum(np.quantile(self._deviations, _QUIET, axis=0), self._most)
+
+    def extent(self, n_samples: int) -> Array:
+        """Return an extent (d,) that so many samples of noise hardly exceed.
+
+        The largest of n is about ``sqrt(2 ln n)`` deviations from the mean, and so is the least.
+        """
+        return np.asarray(self.deviation * 2.0 * math.sqrt(2.0 * math.log(max(n_samples, 2))))
+
+
 class Summary:
     """Counts of what came and what was recognized, and seconds from each deciding sample to its symbol."""
 
@@ -156,6 +187,7 @@ class Listener:
         self._coordinates = None if channels is None else IncrementalCoordinates(channels)
         self._connected: Columns | None = None  # of which it was said what is taken in which unit
         self._said: dict[str, float] = {}
+        self._noise = Noise(n_dims, _MOST_NOISE * size)
         self._recent = np.empty((0, 1 + self._width + n_dims))  # of the last moments: stamp, row, coordinates
         self._began: float | None = None  # of the movement under way
         self._decided: Label | None = None
@@ -297,22 +329,25 @@ class Listener:
     def _rest(self) -> float:
         """Return for how long nothing has moved [s], and forget the samples before."""
         back = self._recent[::-1, 1 + self._width :]
-        extents = (np.maximum.accumulate(back) - np.minimum.accumulate(back)).max(axis=1)
-        near = int((extents <= self.rests.rests * self.rests.size).sum())
+        extents = np.maximum.accumulate(back) - np.minimum.accumulate(back) - self._noise.extent(len(back))
+        near = max(int((extents.max(axis=1) <= self.rests.rests * self.rests.size).sum()), 1)
         self._recent = self._recent[len(back) - near :]
         return float(self._recent[-1, 0] - self._recent[0, 0])
 
     def _remember(self, t: float, row: Array) -> float:
-        """Keep a sample for as long as a rest takes, and return how far anything has moved since."""
+        """Keep a sample for as long as a rest takes, and return how far anything has moved since, besides by noise."""
         moved = row[None] if self._coordinates is None else self._coordinates.take(row[None])
         sample = np.concatenate(([t], row, moved[0]))[None]
         old = max(int((self._recent[:, 0] <= t - self.rests.rest).sum()) - 1, len(self._recent) - _RECENT, 0)
         self._recent = np.concatenate((self._recent[old:], sample))
-        return float(np.ptp(self._recent[:, 1 + self._width :], axis=0).max())
+        self._noise.take(moved[0])
+        extents = np.ptp(self._recent[:, 1 + self._width :], axis=0) - self._noise.extent(len(self._recent))
+        return float(extents.max())
 
     def _begin(self) -> None:
         """Begin a movement with the samples from the last one on that is still near where the window begins."""
-        moved = np.abs(self._recent[:, 1 + self._width :] - self._recent[0, 1 + self._width :]).max(axis=1)
+        moved = np.abs(self._recent[:, 1 + self._width :] - self._recent[0, 1 + self._width :])
+        moved = (moved - 0.5 * self._noise.extent(len(self._recent))).max(axis=1)
         first = max(int(np.flatnonzero(moved > self.rests.rests * self.rests.size)[0]) - 1, 0)
         self._pending = [(float(sample[0]), sample[1 : 1 + self._width]) for sample in self._recent[first:]]
         self._began, self._decided = self._pending[0][0], None

@@ -34,6 +34,13 @@ def test_noise_moves_the_boundaries_little_and_makes_none(make_recording, noise,
     assert np.median(errors) < tolerance
 
 
+@pytest.mark.parametrize("noise", [0.06, 0.1])
+def test_noise_that_no_smoothing_tells_from_the_motion_joins_and_hides_few(make_recording, noise):
+    recordings = [make_recording(seed, noise=noise) for seed in range(20)]
+    counts = [len(kineme.segment(known.recording)) == len(known.truth) for known in recordings]
+    assert np.mean(counts) >= 0.8, counts
+
+
 @given(seed=seeds)
 def test_minima_of_speed_are_cut_and_the_rest_around_them_is_left_out(make_recording, seed):
     known = make_recording(seed)

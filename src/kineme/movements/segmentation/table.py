@@ -28,7 +28,11 @@ _REACH = 0.1  # longest extrapolation of an onset, as a share of the movement
 
 Rows = NDArray[np.intp]
 
-_SMOOTHINGS = 6  # at most: peak speed and smoothing depend on each other, and are found by iteration
+_SMOOTHINGS = 40  # at most: peak speed and smoothing depend on each other, and are found by iteration
+_STEP = 0.7  # smallest ratio of one cutoff to the next
+#: Share of the mean squared speed of the motion that smoothing has to leave. With noise of 0.03 of a movement's extent
+#: `spot` finds 0.82 of the solids by people and 0.88 of their strokes; without this share 0 and 0.13.
+_MOTION_LEFT = 0.85
 _SLOWEST = 2.0  # cycles per recording: the lowest cutoff
 _PEAK_PATH = 0.9  # of the path is covered below the peak speed
 _MIN_SAMPLES = 8  # two movements of four samples
@@ -324,9 +328,11 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     White noise of variance sigma^2 per dimension, sampled at rate r, passes the smoothing spline (see `Smooth`) of
     cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
     ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the limit is taken, so a
-    clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Glitches and
-    jumps are taken out first, see `without_jumps`: a step of 100 m would be most of the path, and all else would be at
-    rest beside its speed. The resolution is the speed that must be distinguished from rest, as a share of the peak.
+    clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move. Where this would
+    smooth the motion away with the noise, more noise is left, and what is slower than twice that noise counts as rest.
+    Glitches and jumps are taken out first, see `without_jumps`: a step of 100 m would be most of the path, and all else
+    would be at rest beside its speed. The resolution is the speed that must be distinguished from rest, as a share of
+    the peak.
 
     A pause may have no samples. The rate is that of the samples without such gaps, each of which counts as ten typical
     steps, and a recording rests in a gap across which it hardly moves.
@@ -347,18 +353,26 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     # `Smooth` takes the mean rate: the same penalty is that of a cutoff lower by the fourth root of their ratio.
     cycles = recording.duration * (clock[-1] / recording.duration) ** 0.25
     demos = Demonstrations([Trajectory(recording.times, positions)])
+    most, before = 0.0, None
     for _ in range(_SMOOTHINGS):
         smooth = Smooth(cutoff * cycles).apply(demos).positions
         speed = np.linalg.norm(np.gradient(smooth, t, axis=0), axis=1)
         across = np.linalg.norm(smooth[gaps + 1] - smooth[gaps], axis=1) / steps[gaps]
         for beside in (gaps, gaps + 1):
             speed[beside] = np.minimum(speed[beside], across)
-        peak = weighted_quantile(speed, speed * np.gradient(t), _PEAK_PATH)  # of the path
+        dt = np.gradient(t)
+        peak = weighted_quantile(speed, speed * dt, _PEAK_PATH)  # of the path
         noise = float(np.sqrt(passed * cutoff**3))
+        energy = float(np.average(speed**2, weights=dt)) - noise**2  # of the motion without noise
+        if before is not None and energy < _MOTION_LEFT * most:  # less noise would cost motion
+            smooth, speed, peak, noise, cutoff = before
+            break
+        if noise**2 < energy:
+            most, before = max(most, energy), (smooth, speed, peak, noise, cutoff)
         aim = resolution * peak / 4.0
         if noise <= 1.05 * aim or cutoff <= slowest:
             break
-        cutoff = max((aim**2 / passed) ** (1.0 / 3.0), slowest)
+        cutoff = max((aim**2 / passed) ** (1.0 / 3.0), slowest, _STEP * cutoff)
     extent, sigma = float(np.linalg.norm(np.ptp(smooth, axis=0))), float(np.sqrt(variance))
     if extent <= max(_NOISE_EXTENTS * sigma, 1e-12 * np.abs(positions).max()):
         raise TrajectoryError(
