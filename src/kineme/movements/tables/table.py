@@ -88,24 +88,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     if layout.keys is None:
         roles = _without_counted(table, roles)
     times, units, units_from = _times(table, roles, layout)
-    # Refuse several columns of times that do not show the same clock.
-    for k in roles.clocks:
-        named = _unit_of_times(table, k)
-        if not any(
-            same_clock(times, in_seconds(table.columns[k], unit)) for unit in ([named] if named else PER_SECOND)
-        ):
-            raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
-    for k in roles.apart:
-        named = _unit_of_times(table, k)
-        if not any(same_rate(times, in_seconds(table.columns[k], unit)) for unit in ([named] if named else PER_SECOND)):
-            head = table.heads[k]
-            own = head if table.heads.count(head) == 1 else k
-            raise DataError(
-                f"expected samples at the times of one clock, got {head!r} in column {k}, which runs at another rate: "
-                "beside it are values of other moments; say which are of one clock with columns=, in the shell "
-                "--columns, or save each sensor in a file of its own and say join_files=True, in the shell "
-                f"--join-files; if all of a row is of one moment, exclude={own!r}, in the shell --exclude"
-            )
+    _check_clocks(table, roles, times)
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
     told_by = [table.heads[k] for k in (*roles.movement, roles.label) if k is not None]
@@ -144,6 +127,25 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     block = Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people)
     excluded = excluded_numbers(heads, layout.excluded)
     return Parsed(detected, block, without_excluded=bool(excluded) and excluded.isdisjoint(roles.positions))
+
+
+def _check_clocks(table: Table, roles: Roles, times: Array) -> None:
+    """Refuse several columns of times that do not show the same clock, and such of other sensors at another rate."""
+    for same, clocks in ((same_clock, roles.clocks), (same_rate, roles.apart)):
+        for k in clocks:
+            units = [named] if (named := _unit_of_times(table, k)) else PER_SECOND
+            if any(same(times, in_seconds(table.columns[k], unit)) for unit in units):
+                continue
+            if same is same_clock:
+                raise no_time(table.heads, [column for column in (roles.time, *roles.clocks) if column is not None])
+            head = table.heads[k]
+            own = head if table.heads.count(head) == 1 else k
+            raise DataError(
+                f"expected samples at the times of one clock, got {head!r} in column {k}, which runs at another rate: "
+                "beside it are values of other moments; say which are of one clock with columns=, in the shell "
+                "--columns, or save each sensor in a file of its own and say join_files=True, in the shell "
+                f"--join-files; if all of a row is of one moment, exclude={own!r}, in the shell --exclude"
+            )
 
 
 def _without_counted(table: Table, roles: Roles) -> Roles:
