@@ -99,8 +99,10 @@ def test_counters_numbers_of_things_and_other_clocks_are_no_coordinates(tmp_path
     clocks = ["epoc (ms)", "motionTimestamp_sinceReboot(s)"]
     others = ["PacketCounter", "loggingSample(N)", "stroke_id", "TrackingId", "__index_level_0__", *clocks]
     counted = dict.fromkeys(others[:2], np.arange(T))
-    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x", "low (min)", *others], counted))
-    assert read.detected[0][0].columns == ("x", "low (min)")
+    read = kineme.read_recordings(
+        _written(tmp_path / "a.csv", [*(own := ["x", "low (min)", "GSR [uS]", "EDA (mS)"]), *others], counted)
+    )
+    assert [*read.detected[0][0].columns] == own
     assert {*read.detected[0][0].ignored} == {*others}
     sessions = np.repeat([0.0, 1.0], T // 2)
     read = kineme.read_recordings(_written(tmp_path / "a.csv", ["x"], {"session": sessions}))

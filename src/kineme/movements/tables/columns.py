@@ -327,11 +327,11 @@ def _is_clock(head: str) -> bool:
 
 def _is_another_clock(head: str, time: str) -> bool:
     """Tell whether a head names the time of another clock than that of `time`: ``time_acc`` beside ``time_emg``."""
-    first, alike = words_of(head)[:1], words_of(time)[:1]
+    first, alike, unit = words_of(head)[:1], words_of(time)[:1], split_head(head)[1] or ""
     return (
         _is_clock(head)
         or (_is_stamp(head) if is_time(time) else first == alike and not TIME_WORDS.isdisjoint(first))
-        or (split_head(head)[1] or "").lower() in TIME_UNITS
+        or (unit.lower() in TIME_UNITS and unit[1:] != "S")  # skin [uS]: siemens
     )
 
 
