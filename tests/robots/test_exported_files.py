@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
 from dataclasses import replace
@@ -34,14 +33,6 @@ def test_numbers_of_a_goal_are_numbers_in_yaml_of_version_1_1_too(trajectory, tm
     written = re.findall(r'"positions": \[(.*?)\]', text)
     assert len(written) == 4
     assert all(_YAML_FLOAT.fullmatch(number) for row in written for number in row.split(", "))
-
-
-def test_a_goal_in_yaml_says_what_it_does_not_hold(trajectory, tmp_path):
-    gripping = dataclasses.replace(trajectory, steps={"a\ngripper": np.zeros(4)})
-    first, goal = write_action_goal(tmp_path / "goal.yaml", gripping).read_text().splitlines()
-    assert first.startswith("# the steps of ")
-    assert "gripper" in first
-    assert json.loads(goal) == json.loads(write_action_goal(tmp_path / "goal.json", gripping).read_text())
 
 
 def test_paths_may_be_texts(trajectory, tmp_path):

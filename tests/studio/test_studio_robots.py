@@ -198,6 +198,14 @@ def test_the_size_is_that_of_the_path_of_the_tip(poses, arms):
     assert np.ptp(wanted, axis=0).max() == pytest.approx(SIZE, rel=1e-3)
 
 
+def test_a_goal_for_an_arm_says_that_the_gripper_is_not_in_it(poses, arms):
+    client, symbol = poses
+    body = {"what": {"symbol": symbol}, "robot": "panda", "size": 0.1, "at": [0.45, 0.0, 0.45], "slow_down": True}
+    note, goal = client.post("/api/robots/export", json={**body, "format": "yaml"}).text.splitlines()
+    assert note == '# the steps of "gripper" are not in an action goal, which is of joints alone; send them yourself'
+    assert "points" in json.loads(goal)["trajectory"]
+
+
 def test_a_goal_that_was_dragged_is_met_by_what_has_an_orientation(poses, arms):
     client, symbol = poses
     shown = client.post("/api/rollout", json={"what": {"symbol": symbol}}).json()

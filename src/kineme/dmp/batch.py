@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kineme.dmp.recorded_as import DiscreteSteps, RecordedAs, make_read_only, merged
 from kineme.errors import DataError, KinemeError, SpecificationError, TrajectoryError
 from kineme.movements.channels.channel import Channels, channels_from_data, channels_to_data, check_alike
+from kineme.movements.preparation.glitches import RemoveGlitches
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
@@ -24,7 +25,7 @@ from kineme.reporting.text import counted
 from kineme.validation import as_path
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
-STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
+STEPS = {"remove-glitches": RemoveGlitches, "trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 
 #: Name of an array in files -> field of `DiscreteSteps`.
 _STEPS_OF = {"step_values": "values", "step_shares": "shares", "step_offsets": "offsets"}

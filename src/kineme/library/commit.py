@@ -26,6 +26,7 @@ from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import NOW, Change, Store, repeated
 from kineme.library.storage.symbols import add_members, keys_by_name, stored_keys
 from kineme.movements.channels.coordinates import with_periods
+from kineme.movements.preparation.glitches import RemoveGlitches
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.similarity.describe import feature_rows
 from kineme.validation import Array, describe
@@ -331,7 +332,7 @@ def stored_times(stamps: Array) -> bytes:
 
 
 def _primitives(demos: Demonstrations, specification: Specification) -> list[Row]:
-    learned = specification.dmp.learn(demos)
+    learned = specification.dmp.learn(Demonstrations.of_movements(RemoveGlitches().apply(demos)))
     boundary = np.stack([learned.starts, learned.goals, learned.velocities, learned.extents], axis=1)
     with np.errstate(over="ignore"):  # refused below
         weights = learned.scaled_weights.astype(np.float32)

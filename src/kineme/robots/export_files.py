@@ -141,8 +141,7 @@ def _definition(store: Any, kind: str, trajectory: JointTrajectory, is_ros1: boo
 def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
     """Write JSON, which is YAML too: both ``.json`` and ``.yaml`` are read by ROS 2.
 
-    A comment in YAML says which channels are left out. Numbers without a decimal point, as 1e-05, get one: YAML 1.1
-    takes them for texts.
+    Numbers without a decimal point, as 1e-05, get one: YAML 1.1 takes them for texts.
     """
     rows = [
         {
@@ -155,8 +154,6 @@ def write_action_goal(path: str | Path, trajectory: JointTrajectory) -> Path:
     ]
     points = _WITHOUT_POINT.sub(r"\1.0\2", json.dumps(rows))  # there are no texts in them but their keys
     text = f'{{"trajectory": {{"joint_names": {json.dumps(trajectory.joints)}, "points": {points}}}}}\n'
-    if Path(path).suffix != ".json" and (note := not_in_goal(trajectory)):
-        text = f"# {note}\n{text}"
     return write_atomically(Path(path), text.encode())
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.dmp.generation.generate import learn_one
+from kineme.movements import RemoveGlitches
 from kineme.movements.preparation.glitches import without_glitches, without_jumps
 
 
@@ -38,6 +40,30 @@ def test_known_movements_are_spotted_beside_a_glitch(make_recording):
     )
     assert expected
     assert found == expected
+
+
+def test_a_robot_follows_no_sample_that_a_tracker_lost(tmp_path):
+    """Three samples far away took the primitive there, 0.98 of the extent off its path."""
+    seen = kineme.load_lasa(["CShape"])[5]
+    x = seen.positions + 300.0
+    lost, extent = x.copy(), np.ptp(x, axis=0).max()
+    lost[400:403] = -100.0
+    path = kineme.DMP().learn(kineme.Trajectory(seen.times, x)).rollout().positions
+
+    def off(primitives):
+        return np.abs(primitives.rollout().positions - path).max() / extent
+
+    movement = kineme.Trajectory(seen.times, lost)
+    assert off(kineme.DMP().learn(movement)) > 0.5
+    assert off(kineme.DMP(preprocessing=(RemoveGlitches(),)).learn(movement)) < 1e-3
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn([movement], ["c"])
+        assert off(library.primitives("c")) < 1e-3
+    table = tmp_path / "lost.csv"
+    np.savetxt(table, np.column_stack([seen.times, lost]), delimiter=",", header="time [s],x,y", comments="")
+    recordings = kineme.read_recordings(table)
+    assert off(learn_one(recordings.demonstrations[0], kineme.DMP()).primitive) < 1e-3
+    assert "1 movement with samples far from the path, the first lost.csv after" in " ".join(recordings.notes)
 
 
 def whole(x):

@@ -18,6 +18,7 @@ from kineme.io.arrays.npz import kind_of
 from kineme.io.writing.write_movement import ColumnNames, Columns, names_of
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, turns_beyond
+from kineme.movements.preparation.glitches import RemoveGlitches, without_glitches
 from kineme.movements.rotations import NORM_TOLERANCE, angle_between
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import LARGEST, Array
@@ -266,7 +267,8 @@ class Learned:
 
 
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
-    """The primitive of a recording, whatever it holds; with orientations it is one of poses."""
+    """The primitive of a recording, whatever it holds, without its glitches; with orientations it is one of poses."""
+    dmp = replace(dmp, preprocessing=(RemoveGlitches(), *dmp.preprocessing))
     return Learned((PoseDMP(dmp) if has_orientation(demonstration) else dmp).learn([demonstration]), demonstration)
 
 
@@ -312,7 +314,7 @@ def _deviations(demonstration: Trajectory, generated: Array) -> Iterator[tuple[f
     kinds = [channel.kind for channel in channels for _ in channel.columns] or ["position"] * generated.shape[1]
     for kind in ("position", "angle"):
         columns = [k for k, name in enumerate(kinds) if name == kind]
-        recorded = demonstration.recorded[:, columns]
+        recorded = without_glitches(demonstration.recorded[:, columns], np.array([0, len(demonstration)]))
         off = np.linalg.norm(generated[:, columns] - recorded, axis=1)
         yield float(off.max()), float(np.linalg.norm(np.ptp(recorded, axis=0))), f"{kind}s"
     for channel, some in zip(channels, columns_of(channels), strict=True):

@@ -23,6 +23,7 @@ from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.column_match import columns_detected
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels, kinds_of
+from kineme.movements.preparation.glitches import without_glitches
 from kineme.movements.tables.layout import Block, Detected, Layout, Repair, listed
 from kineme.movements.tables.table import as_name
 from kineme.movements.tables.time_stamps import GUESSED
@@ -338,8 +339,25 @@ def notes_on_gaps(recordings: Recordings) -> list[str]:
 
 
 def notes_on_values(recordings: Recordings) -> list[str]:
-    """Say what stamps and columns of movements let doubt: their unit, gaps, rotation vectors that jump."""
-    return _notes_on_sampling(recordings) + notes_on_rotation_vectors(recordings.demonstrations)
+    """Say what stamps and columns of movements let doubt: unit, gaps, lost samples, rotation vectors that jump."""
+    of_vectors = notes_on_rotation_vectors(recordings.demonstrations)
+    return _notes_on_sampling(recordings) + _notes_on_glitches(recordings) + of_vectors
+
+
+def _notes_on_glitches(recordings: Recordings) -> list[str]:
+    """Say that samples leave the path, as of a tracker that lost what it follows."""
+    demos = recordings.demonstrations
+    positions = without_glitches(demos.positions, demos.offsets)
+    if positions is demos.positions:
+        return []
+    rows = np.flatnonzero((positions != demos.positions).any(axis=1))
+    movement = np.searchsorted(demos.offsets, rows, side="right") - 1
+    at = demos.times[rows[0]] - demos.times[demos.offsets[movement[0]]]
+    return [
+        f"{counted(len(np.unique(movement)), 'movement')} with samples far from the path, the first "
+        f"{recordings.short_names[movement[0]]} after {at:.3g} s, as of a tracker that lost what it follows; they are "
+        "left out where movements are recognized and moved again, in Python by kineme.movements.RemoveGlitches()"
+    ]
 
 
 def _notes_on_sampling(recordings: Recordings) -> list[str]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.sampling import runs
 from kineme.validation import Array
 
@@ -18,6 +22,22 @@ RETURN = 0.2
 #: A movement whose longest step is no more than so many mean ones is not searched: a glitch in it would be a few
 #: hundredths of its path, which smoothing bears.
 MEAN_STEPS = 6.0
+
+
+@dataclass(frozen=True)
+class RemoveGlitches:
+    """Leave out samples that a tracker lost: a primitive follows them, and so does a robot.
+
+    At most three samples that leave the path at once and return, and a value that is held far from it, such as zeros
+    while nothing is seen, give way to the path beside them; all others stay as they are, to the last bit. `Recognizer`
+    does so by itself, `kineme.ActionLibrary` for its primitives, and the shell.
+    """
+
+    def apply(self, demonstrations: Demonstrations) -> Movements:
+        """Return the movements without their glitches."""
+        movements = demonstrations.movements
+        positions = without_glitches(movements.positions, demonstrations.offsets)
+        return movements if positions is movements.positions else replace(movements, positions=positions)
 
 
 def without_glitches(positions: Array, offsets: NDArray[np.intp]) -> Array:

@@ -17,7 +17,7 @@ from kineme.dmp.generation.generate import Learned
 from kineme.errors import KinemeError, SpecificationError
 from kineme.io.writing.write_movement import WRITERS
 from kineme.robots.execution.preflight import Preflight, checks_as_data, preflight_table
-from kineme.robots.export_files import write_action_goal, write_bag, write_joints
+from kineme.robots.export_files import not_in_goal, write_action_goal, write_bag, write_joints
 from kineme.robots.kinematics.descent import InverseKinematics, descend
 from kineme.robots.models.robot import MODELS, Robot, load
 from kineme.robots.planning.generate_at import generate_at
@@ -161,14 +161,20 @@ def move(studio: Reads, body: MoveRequest) -> dict[str, Any]:
     responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
 )
 def export(studio: Reads, body: SaveRequest) -> Response:
-    """Joints over time as a table, an action goal of ROS 2 (.yaml) or a bag; nothing that must not be executed."""
+    """Joints over time as a table, an action goal of ROS 2 (.yaml) or a bag; nothing that must not be executed.
+
+    A comment in the goal says which channels are not in it.
+    """
     ending = f".{body.format.lower().lstrip('.')}"
     if ending not in {**WRITERS, **_ROS}:
         raise SpecificationError(f"expected one of the formats {', '.join({**WRITERS, **_ROS})}, got {ending[:20]!r}")
     trajectory = _planned(studio, body, _arm(body.robot)).trajectory
     with TemporaryDirectory() as folder:
         path = _ROS.get(ending, write_joints)(Path(folder) / f"joints{ending}", trajectory)
-        return as_file(path.read_bytes(), f"{name_of(studio, body.what)} on {body.robot}", ending)
+        data, note = path.read_bytes(), not_in_goal(trajectory) if ending == ".yaml" else ""
+    return as_file(
+        f"# {note}\n".encode() + data if note else data, f"{name_of(studio, body.what)} on {body.robot}", ending
+    )
 
 
 @router.post("/follow", response_model=FollowOut, summary="An arm whose tip follows a hand")
