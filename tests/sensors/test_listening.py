@@ -193,6 +193,7 @@ def test_columns_are_found_by_names_units_or_as_chosen(tmp_path):
         assert silent.told == ["the stream says no units; taken as x [mm], y [mm], as in the library"]
         missing = Heard(library).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert "expected the column 'x" in missing.told[0]
+        assert "choose others with --columns" in missing.told[0]
         wrong = Heard(library, choose=("d",)).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert wrong.told == ["other columns: expected the columns d, got a, c, b; its samples are left out"]
         nameless = Heard(library).feed(turned, Columns(("value0", "value1", "value2"), (None,) * 3))

@@ -278,7 +278,10 @@ class Listener:
         if wanted is None:
             return rows
         ours = columns if by_name else Columns(wanted.heads, units)
-        taken = columns_like(rows, ours, wanted, known_units=False)
+        try:
+            taken = columns_like(rows, ours, wanted, known_units=False)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{error}; choose others with --columns") from error
         if columns != self._connected:
             self._connected, said = columns, dict(zip(ours.names, ours.units, strict=True))
             columns_in = zip(wanted.heads, wanted.names, wanted.units, strict=True)
