@@ -7,7 +7,7 @@ import threading
 import pytest
 from piece_work import lengths, parts_of, write_archive, write_rows
 
-from kineme.errors import DataError
+from kineme.errors import DataError, KinemeError
 from kineme.pieces import archive as stored
 from kineme.pieces import map as map_pieces
 from kineme.pieces import plan
@@ -143,5 +143,22 @@ def test_a_file_that_has_changed_since_the_listing_fails_its_piece(uri, tmp_path
 
 def test_a_bucket_that_is_not_there_is_said(uri, tmp_path):
     address = uri(write_archive(tmp_path / "archive", 1), "some")
-    with pytest.raises(DataError, match=r"found none|refuses"):
+    with pytest.raises(DataError, match="expected the bucket 'nowhere' of s3://nowhere/some"):
         plan(address.replace("fleet/some", "nowhere/some"))
+    with pytest.raises(DataError, match="found none"):
+        plan(address.replace("fleet/some", "fleet/other"))
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("s3://fleet/a?endpoint=http://127.0.0.1:1", "Unexpected query parameter in S3 URI: 'endpoint'"),
+        ("s3:///a", "Missing bucket name"),
+        ("unheard://fleet/a", "unheard"),
+    ],
+)
+def test_what_is_wrong_with_a_uri_is_said_by_who_knows_its_scheme(address, said):
+    """A package was to be installed that would not have helped."""
+    with pytest.raises(KinemeError, match=said) as caught:
+        stored._open(address)
+    assert ("pyarrow opens" in str(caught.value)) == address.startswith("s3")

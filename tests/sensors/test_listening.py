@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 from sensor_samples import RATE, make_library, session, take
 
 import kineme
+from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.column_match import Columns
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import of_channels
 from kineme.sensors import listen as listening
 from kineme.sensors.listen import NOTHING, Block, Listener, Summary, Symbol, listen
 from soaking import examples, slow
@@ -78,6 +81,37 @@ def test_a_sensor_that_trembles_rests_too(library):
     names = [symbol.name for symbol in heard.symbols if symbol.is_over and symbol.certainty != "new"]
     assert names == ["GShape", "WShape"]
     assert "no rest" not in heard.listener.summary.problems
+
+
+def test_degrees_do_not_hide_meters(tmp_path):
+    """Movements of half a meter were none beside a wrist that turns by 60 degrees."""
+    channels = (
+        *(Channel(axis, "position", (axis,), "m") for axis in "xy"),
+        Channel("wrist", "angle", ("wrist",), "deg"),
+    )
+    demos = kineme.load_lasa(["Sine"])[:3]
+    paths = [np.column_stack((demo.positions / 100, np.linspace(0.0, 60.0, len(demo)))) for demo in demos]
+    learned = of_channels(Demonstrations.from_arrays(paths).movements, channels)
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(Demonstrations.of_movements(learned), ["Sine"] * len(demos))
+        rows = np.column_stack((take("Sine") / 100, np.zeros(len(take("Sine")))))
+        heard = Heard(library).feed(rows, Columns(("x", "y", "wrist"), ("m", "m", "deg")))
+    assert "Sine" in heard.ended
+
+
+def test_what_is_too_slow_to_begin_a_movement_is_said(library):
+    """It was missed without a word."""
+    rows = take("Sine")
+    slow_rows = 0.3 * np.column_stack(
+        [np.interp(np.arange(0.0, len(rows), 0.3), np.arange(len(rows)), x) for x in rows.T]
+    )
+    heard = Heard(library).feed(slow_rows)
+    assert not heard.ended
+    assert len(heard.told) == 1
+    assert heard.told[0].startswith("no movement: something moves, but a movement begins with 8 % of the size")
+    size = np.ptp(rows, axis=0).max()
+    trembling = 0.01 * size * np.random.default_rng(0).normal(size=(700, 2))
+    assert not Heard(library).feed(rows[:1] + trembling).told
 
 
 def test_start_and_end_are_those_of_the_motion_and_the_decision_comes_a_rest_later(library):
@@ -193,6 +227,7 @@ def test_columns_are_found_by_names_units_or_as_chosen(tmp_path):
         assert silent.told == ["the stream says no units; taken as x [mm], y [mm], as in the library"]
         missing = Heard(library).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert "expected the column 'x" in missing.told[0]
+        assert "choose others with --columns" in missing.told[0]
         wrong = Heard(library, choose=("d",)).feed(turned[:5], Columns(("a", "c", "b"), (None,) * 3))
         assert wrong.told == ["other columns: expected the columns d, got a, c, b; its samples are left out"]
         nameless = Heard(library).feed(turned, Columns(("value0", "value1", "value2"), (None,) * 3))

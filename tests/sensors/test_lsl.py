@@ -68,14 +68,38 @@ def test_a_stream_is_found_by_its_name_with_labels_units_and_stamps(name):
     source.close()
 
 
-def test_streams_of_another_type_or_of_texts_are_not_taken(name):
+def _notes(source, until, seconds=20.0):
+    """What it says until one of its sentences has these words."""
+    notes, end = [], time.monotonic() + seconds
+    while time.monotonic() < end and not any(until in sentence for _, sentence in notes):
+        notes += source.receive(0.02).notes
+    return notes
+
+
+def test_a_stream_of_texts_is_said_and_none_is_waited_for_once(name):
+    """It was as if there were no stream, counted with each look."""
     outlet, source = _outlet(name), LslSource(name=name, kind="EEG")
     texts = pylsl.StreamOutlet(pylsl.StreamInfo(name, "EEG", 1, 0, pylsl.cf_string, name + "t"))
-    for _ in range(20):
-        assert {kind for kind, _ in source.receive(0.1).notes} == {"no stream"}
+    assert _notes(source, "texts") + _notes(source, "never", 0.3) == [
+        ("no stream", f"waiting for one with name {name!r} and type 'EEG'"),
+        ("other columns", f"expected numbers, got texts; the stream {name!r} is left out"),
+    ]
     assert source.columns is None
     source.close()
     del outlet, texts
+
+
+def test_of_several_streams_the_one_that_can_be_used_is_taken(name):
+    """Whichever answered first was taken, and its samples were left out to the end."""
+    eye = _outlet(name, ("x", "y", "z"), source_id=name + "e")
+    source = LslSource(name=name, refusal=lambda columns: "expected 2" if len(columns.heads) != 2 else "")
+    assert _notes(source, "left out")[-1] == ("other columns", f"expected 2; the stream {name!r} is left out")
+    hand = _outlet(name, source_id=name + "h")
+    (listening,) = _notes(source, "listening")
+    assert listening[1].endswith(f"x, y at 100 samples per second; {name} left out, --name chooses")
+    assert source.columns.heads == ("x", "y")
+    source.close()
+    del eye, hand
 
 
 def test_columns_without_labels_or_with_one_twice_have_numbers(name):

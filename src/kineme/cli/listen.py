@@ -44,7 +44,7 @@ listening_options = under(
 @click.option("--to", "sinks", type=click.Choice(["lsl", "osc"]), multiple=True, help="Where symbols go, too.")
 @listening_options
 @heading("LSL")
-@click.option("--name", help="Name of the stream.  [default: any with numbers]")
+@click.option("--name", help="Name of the stream.  [default: the first that fits]")
 @click.option("--type", "kind", help="Type of the stream, as MoCap.")
 @click.option("--names", is_flag=True, help="Markers are the names of ended movements.  [default: JSON of all]")
 @click.option("--lan", is_flag=True, help="Find, and be found by, other machines.  [default: this machine alone]")

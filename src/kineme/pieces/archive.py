@@ -24,6 +24,7 @@ _REMOTE = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")
 _CHUNK = 2**22  # bytes that are copied at a time
 _HEAD = 4096  # bytes of a marker that tell a data set
 _PRIVATE = re.compile(r"://[^/@]*@")  # a name and password in a URI
+_STORES = re.compile(r"(s3|gs|gcs|abfss?)://", re.I)  # with buckets, which pyarrow opens
 
 
 class File(NamedTuple):
@@ -196,11 +197,17 @@ def _open(archive: str) -> tuple[Any, str]:
         return system, path
     except (ArrowException, OSError, ValueError) as error:
         refused = error
+    is_known = bool(_STORES.match(archive)) and not isinstance(refused, NotImplementedError)  # pyarrow without it
+    reason = f"expected a URI that pyarrow opens, got {archive}: {_reason(refused)}"
+    if is_known and "?" in archive:  # options, which fsspec would take for a part of the path
+        raise SpecificationError(reason) from refused
     try:
         import fsspec
 
         system, path = fsspec.core.url_to_fs(archive)
     except ImportError as error:
+        if is_known:
+            raise SpecificationError(reason) from refused
         raise DataError(
             f"expected a package that opens {archive}, got none ({_reason(refused)}); pip install fsspec and "
             "the package that it names"
@@ -219,6 +226,9 @@ def _remote_units(archive: str) -> list[Unit]:
         found = [top]
         if top.type != fs.FileType.File:
             found = system.get_file_info(fs.FileSelector(base, recursive=True, allow_not_found=True))
+        bucket = base.partition("/")[0]
+        if not found and _STORES.match(archive) and system.get_file_info([bucket])[0].type == fs.FileType.NotFound:
+            raise DataError(f"expected the bucket {bucket!r} of {archive}, the store has none of this name")
     except (ArrowException, OSError) as error:
         raise DataError(f"expected to list {archive}, the store refuses ({_reason(error)})") from error
     names: dict[str, File] = {}

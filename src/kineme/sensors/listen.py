@@ -19,6 +19,7 @@ from kineme.errors import KinemeError, TrajectoryError
 from kineme.library.library import ActionLibrary
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
+from kineme.movements.channels.coordinates import lengths_of
 from kineme.movements.channels.detect import name_of
 from kineme.movements.channels.incremental import IncrementalCoordinates
 from kineme.movements.segmentation.table import noise_deviations
@@ -39,6 +40,7 @@ _RECENT = 10_000  # samples within a rest that are looked at, of a sensor whose 
 _RUN, _RUNS = 16, 64  # samples of which noise is measured, and such runs that are remembered
 _QUIET = 0.2  # share of the runs that rest, at least: while a hand moves, its motion looks like noise, too
 _MOST_NOISE = 0.1  # of the size of a movement
+_WATCHED = 3.0  # seconds in which what moves as far as where movements begin, but slower, is said
 
 
 class Block(NamedTuple):
@@ -95,9 +97,9 @@ class Sink(Protocol):
 
 @dataclass(frozen=True)
 class Rests:
-    """Borders of movements in a stream, by the extent of the largest coordinate in the time of a rest."""
+    """Borders of movements in a stream, by the extent of the largest coordinate in the time of a rest, as a length."""
 
-    size: float  # extent of a usual movement
+    size: float  # extent of a usual movement, see `lengths_of`
     longest: float  # duration after which a movement ends although nothing rests [s]
     rest: float = 0.3  # a movement is over when nothing has moved for so long [s]
     silence: float = 0.5  # or when there is no sample for so long by the stamps [s]
@@ -174,14 +176,15 @@ class Listener:
         self._live, self._version = library.stream(), library.version
         ids = library.ids()
         movements = library.movements(ids=ids[evenly_spaced(len(ids), _MEASURED)])
-        size = float(np.median([np.ptp(movement.positions, axis=0).max() for movement in movements]))
-        self.rests = Rests(size, _LONGEST * float(movements.durations.max()) + rest, rest)
         example = movements[0]
         self._live.update(example.times, example.recorded)
         self._live.remember(self._live.finish())  # code is loaded now, not when the first movement ends
         self._live.reset(person=True)
         channels = self._live.channels
         n_dims = library.n_dims or 0
+        self._lengths = np.ones(n_dims) if channels is None else lengths_of(channels)  # else degrees hide meters
+        size = float(np.median([(np.ptp(movement.positions, axis=0) * self._lengths).max() for movement in movements]))
+        self.rests = Rests(size, _LONGEST * float(movements.durations.max()) + rest, rest)
         self._wanted = None if channels is None else columns_recorded(channels)
         self._width = n_dims if channels is None else len(recorded_names(channels))
         self._coordinates = None if channels is None else IncrementalCoordinates(channels)
@@ -189,6 +192,7 @@ class Listener:
         self._said: dict[str, float] = {}
         self._noise = Noise(n_dims, _MOST_NOISE * size)
         self._recent = np.empty((0, 1 + self._width + n_dims))  # of the last moments: stamp, row, coordinates
+        self._watched: tuple[float, Array, Array] | None = None  # since when, and between which coordinates, it is slow
         self._began: float | None = None  # of the movement under way
         self._decided: Label | None = None
         self._pending: list[tuple[float, Array]] = []  # samples of it that the recognizer has not taken yet
@@ -278,7 +282,10 @@ class Listener:
         if wanted is None:
             return rows
         ours = columns if by_name else Columns(wanted.heads, units)
-        taken = columns_like(rows, ours, wanted, known_units=False)
+        try:
+            taken = columns_like(rows, ours, wanted, known_units=False)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{error}; choose others with --columns") from error
         if columns != self._connected:
             self._connected, said = columns, dict(zip(ours.names, ours.units, strict=True))
             columns_in = zip(wanted.heads, wanted.names, wanted.units, strict=True)
@@ -308,8 +315,7 @@ class Listener:
             self._last_time = t
             extent = self._remember(t, rows[k])
             if self._began is None:
-                if extent > self.rests.sets_out * self.rests.size:
-                    self._begin()
+                self._await(t, extent)
                 continue
             self._pending.append((t, rows[k]))
             rested = self._rest()
@@ -337,6 +343,7 @@ class Listener:
     def _remember(self, t: float, row: Array) -> float:
         """Keep a sample for as long as a rest takes, and return how far anything has moved since, besides by noise."""
         moved = row[None] if self._coordinates is None else self._coordinates.take(row[None])
+        moved = moved * self._lengths
         sample = np.concatenate(([t], row, moved[0]))[None]
         old = max(int((self._recent[:, 0] <= t - self.rests.rest).sum()) - 1, len(self._recent) - _RECENT, 0)
         self._recent = np.concatenate((self._recent[old:], sample))
@@ -344,13 +351,32 @@ class Listener:
         extents = np.ptp(self._recent[:, 1 + self._width :], axis=0) - self._noise.extent(len(self._recent))
         return float(extents.max())
 
+    def _await(self, t: float, extent: float) -> None:
+        """Begin a movement where something moves far enough, and say it of what does so too slowly."""
+        enough = self.rests.sets_out * self.rests.size
+        if extent > enough:
+            self._begin()
+            return
+        at = self._recent[-1, 1 + self._width :]
+        since, low, high = self._watched or (t, at, at)
+        self._watched = since, np.minimum(low, at), np.maximum(high, at)
+        if t - since > _WATCHED:
+            self._watched = None
+            if float((high - low - self._noise.extent(_RECENT)).max()) > enough:
+                share = f"{100 * self.rests.sets_out:g} % of the size of those of the library"
+                self.note(
+                    "no movement",
+                    f"something moves, but a movement begins with {share} in {self.rests.rest:g} s; move faster or "
+                    "larger, or choose a longer --rest",
+                )
+
     def _begin(self) -> None:
         """Begin a movement with the samples from the last one on that is still near where the window begins."""
         moved = np.abs(self._recent[:, 1 + self._width :] - self._recent[0, 1 + self._width :])
         moved = (moved - 0.5 * self._noise.extent(len(self._recent))).max(axis=1)
         first = max(int(np.flatnonzero(moved > self.rests.rests * self.rests.size)[0]) - 1, 0)
         self._pending = [(float(sample[0]), sample[1 : 1 + self._width]) for sample in self._recent[first:]]
-        self._began, self._decided = self._pending[0][0], None
+        self._began, self._decided, self._watched = self._pending[0][0], None, None
         self._live.reset()
 
     def _update(self) -> Iterator[Symbol]:
@@ -396,7 +422,7 @@ class Listener:
 
     def _forget(self) -> None:
         """Forget the movement under way and the samples before; the clock and the turns of angles begin anew."""
-        self._began, self._pending, self._answer = None, [], None
+        self._began, self._pending, self._answer, self._watched = None, [], None, None
         self._recent = self._recent[:0]
         if self._coordinates is not None:
             self._coordinates.clear()

@@ -19,6 +19,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.records import damaged_as, needs
 from kineme.movements.channels.column_match import Columns
+from kineme.reporting.text import first_names
 from kineme.sensors.listen import NOTHING, Block, Sink, Source, Symbol
 
 #: Streams of this machine alone are looked for, and none is announced to others.
@@ -44,22 +45,32 @@ def _load(lan: bool) -> Any:
 
 
 class LslSource:
-    """Samples of the first stream of a name or a type, looked for until it is there, and again when it has gone.
+    """Samples of the first usable stream of a name or a type, looked for until it is there, and again when it has gone.
 
-    Stamps are those of the sender, in the clock of this machine. With `lan`, other machines are asked, too.
+    Stamps are those of the sender, in the clock of this machine. With `lan`, other machines are asked, too. `refusal`
+    says of columns why they cannot be used, nothing of those that can.
     """
 
-    def __init__(self, name: str | None = None, kind: str | None = None, lan: bool = False) -> None:
+    def __init__(
+        self, name: str | None = None, kind: str | None = None, lan: bool = False,
+        refusal: Callable[[Columns], str] = lambda _: "",
+    ) -> None:  # fmt: skip
         self._lsl = _load(lan)
         self._wanted = {key: value for key, value in (("name", name), ("type", kind)) if value is not None}
+        self._refusal = refusal
         self._streams = self._lsl.ContinuousResolver()
+        self._refused = set[str]()  # streams of which it was said why they are left out
+        self._waits = False  # said that there is no stream
         self._inlet: Any = None
         self.columns: Columns | None = None
 
     def receive(self, timeout: float) -> Block:
         """Wait for samples of the stream, or for the stream."""
         if self._inlet is None:
-            return self._connect(timeout)
+            notes = self._connect()
+            if self._inlet is None:
+                time.sleep(timeout)
+            return NOTHING._replace(notes=notes)
         try:
             rows, times = self._inlet.pull_chunk(timeout=timeout, min_samples=1, as_numpy=True)
         except RuntimeError:  # all its errors are such
@@ -67,30 +78,48 @@ class LslSource:
             return NOTHING._replace(notes=[("stream lost", "looking for it again")])
         return Block(np.asarray(times, dtype=float), np.asarray(rows, dtype=float))
 
-    def _connect(self, timeout: float) -> Block:
+    def _connect(self) -> list[tuple[str, str]]:
+        """Take the first stream that can be used, and return what is to be said of it, or of those that cannot."""
         streams = [
             info for info in self._streams.results()
-            if info.channel_format() != _TEXT and info.channel_count() <= _MOST_CHANNELS
-            and all(getattr(info, key)() == value for key, value in self._wanted.items())
+            if all(getattr(info, key)() == value for key, value in self._wanted.items())
+            and (self._wanted or info.channel_format() != _TEXT)  # markers of others are no news
         ]  # fmt: skip
-        if not streams:
-            time.sleep(timeout)
+        if not streams and not self._waits:
+            self._waits = True
             wanted = " and ".join(f"{key} {value!r}" for key, value in self._wanted.items()) or "numbers"
-            return NOTHING._replace(notes=[("no stream", f"waiting for one with {wanted}")])
-        inlet = self._lsl.StreamInlet(streams[0], max_buflen=10, processing_flags=self._lsl.proc_clocksync)
-        try:
-            inlet.open_stream(timeout=_SYNCHRONIZED)
-            inlet.time_correction(timeout=_SYNCHRONIZED)  # the first sample would wait for it
-            info = inlet.info(timeout=_SYNCHRONIZED)
-        except RuntimeError:
-            return NOTHING._replace(notes=[("no stream", "the one that was there did not answer")])
-        self._inlet, self.columns = inlet, _columns(info)
-        others = f", {len(streams) - 1} more would do" if len(streams) > 1 else ""
-        rate = f" at {info.nominal_srate():g} samples per second" if info.nominal_srate() else ""
-        named = (
-            f"listening to {info.name()!r} of type {info.type()!r}, {', '.join(self.columns.heads[:12])}{rate}{others}"
-        )
-        return NOTHING._replace(notes=[("", named)])
+            return [("no stream", f"waiting for one with {wanted}")]
+        self._refused &= {info.uid() for info in streams}
+        reasons = list[str]()
+        for stream in streams:
+            if stream.uid() in self._refused:
+                continue
+            inlet = self._lsl.StreamInlet(stream, max_buflen=10, processing_flags=self._lsl.proc_clocksync)
+            try:
+                info = inlet.info(timeout=_SYNCHRONIZED)
+                if why := self._unfit(info):
+                    self._refused.add(stream.uid())
+                    reasons.append(f"{why}; the stream {info.name()!r} is left out")
+                    continue
+                inlet.open_stream(timeout=_SYNCHRONIZED)
+                inlet.time_correction(timeout=_SYNCHRONIZED)  # the first sample would wait for it
+            except RuntimeError:
+                return [("no stream", f"{stream.name()!r}, which was there, did not answer")]
+            self._inlet, self.columns, self._waits = inlet, _columns(info), False
+            names = [other.name() for other in streams if other is not stream]
+            others = f"; {first_names(names, 6)} left out, --name chooses" if names else ""
+            rate = f" at {info.nominal_srate():g} samples per second" if info.nominal_srate() else ""
+            heads = first_names(self.columns.heads, 12)
+            return [("", f"listening to {info.name()!r} of type {info.type()!r}, {heads}{rate}{others}")]
+        return [("other columns", "; ".join(reasons))] if reasons else []  # one note: of a kind one is said at a time
+
+    def _unfit(self, info: Any) -> str:
+        """Say why a stream cannot be used; empty of one that can."""
+        if info.channel_format() == _TEXT:
+            return "expected numbers, got texts"
+        if info.channel_count() > _MOST_CHANNELS:
+            return f"expected at most {_MOST_CHANNELS:,} channels, got {info.channel_count():,}"
+        return self._refusal(_columns(info))
 
     def close(self) -> None:
         """Leave the stream."""
@@ -247,6 +276,6 @@ class Adapter(NamedTuple):
 
 
 ADAPTERS = {
-    "lsl": Adapter(LslSource, ("name", "kind", "lan"), LslSink, ("names", "lan")),
+    "lsl": Adapter(LslSource, ("name", "kind", "lan", "refusal"), LslSink, ("names", "lan")),
     "osc": Adapter(OscSource, ("port", "host", "address", "stamped", "refusal"), OscSink, ("send_to",)),
 }

@@ -11,7 +11,7 @@ import kineme
 from kineme.dmp.pose.tangent import as_poses
 from kineme.dmp.recorded_as import RecordedAs
 from kineme.movements.channels.channel import Channel
-from kineme.movements.channels.coordinates import as_wxyz, canonical, learned
+from kineme.movements.channels.coordinates import as_wxyz, canonical, learned, lengths_of
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import of_channels
@@ -135,6 +135,15 @@ def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
     np.testing.assert_allclose(learned(columns, np.array([0, 30]), channels)[-1], [0, 0, 0, 2 * lever], atol=1e-9)
     joint = (Channel("x", "angle", ("x",), "rad"), Q)
     np.testing.assert_allclose(learned(columns, np.array([0, 30]), joint)[-1], [0, 0, 0, 2], atol=1e-9)
+
+
+def test_lengths_compare_coordinates_of_several_units():
+    units = ("mm", "deg", "%", None, "furlong")
+    channels = (*(Channel(str(k), "position", (str(k),), unit) for k, unit in enumerate(units)), Q)
+    grip = Channel("grip", "discrete", ("grip",))
+    metric = [0.001, 0.2 * np.pi / 180, 0.002, 0.001, 0.001, 0.001, 0.001, 0.001]  # a radian is 200 mm already
+    np.testing.assert_allclose(lengths_of((*channels, grip)), metric)
+    np.testing.assert_allclose(lengths_of((Channel("q", "angle", ("q",), "rad"),)), [0.2])
 
 
 def test_discrete_channels_alone_are_refused():

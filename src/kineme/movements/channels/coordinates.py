@@ -122,6 +122,21 @@ def lever_of(channels: Channels) -> float:
     return float(converted(_LEVER, UNITS["m"], unit)) if unit is not None and unit.quantity == "length" else _LEVER
 
 
+def lengths_of(channels: Channels) -> Array:
+    """Return how long a step of 1 in each coordinate (d,) counts beside the others [m].
+
+    A radian counts as the way of a tool, see `lever_of`, and so does the range of a joint; without a unit a coordinate
+    counts as an orientation does: in the unit of the positions.
+    """
+    known = {"length": 1.0, "angle": _LEVER, "range": _LEVER}
+    units = [(unit_named(channel.unit or ""), len(channel.coordinates)) for channel in channels]
+    lengths = [
+        float(unit.size) * known[unit.quantity] if unit and unit.quantity in known else _LEVER / lever_of(channels)
+        for unit, _ in units
+    ]
+    return np.repeat(lengths, [n for _, n in units])
+
+
 def as_wxyz(q: Array, channel: Channel) -> Array:
     """Quaternions (..., 4) in the order of a channel's columns as (w, x, y, z)."""
     return q[..., [channel.order.index(part) for part in "wxyz"]]
