@@ -32,6 +32,7 @@ from kineme.library.storage.postgres import ServerConnection, translated
 from kineme.library.storage.rows import insert
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import repeated
+from kineme.library.storage.symbols import make
 from kineme.studio.page.write_page import write_page
 from kineme.studio.server.app import create_app
 from soaking import slow
@@ -258,6 +259,11 @@ def test_writers_of_the_same_new_symbol_learn_beside_each_other(address):
     with ActionLibrary(address) as library:
         assert len(library["new"]) == 9
         assert library.verify() == []
+
+
+def test_a_name_that_another_writer_gave_meanwhile_is_a_conflict_which_is_tried_again(library):
+    with pytest.raises(ConflictError, match=r"got in the way of another process"), library.store.writing("x") as change:
+        make(change, "wave")  # as if it had not been there when it was looked for
 
 
 def test_movements_of_other_dimensions_are_refused_also_if_they_come_at_the_same_time(place, monkeypatch):
