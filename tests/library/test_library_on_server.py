@@ -91,6 +91,14 @@ def test_a_library_moves_to_a_server_and_back_with_every_row(eventful, address, 
         ActionLibrary.import_(eventful / "one.kineme", address)
 
 
+def test_an_export_of_a_server_is_the_same_file_as_that_of_its_import(library, tmp_path):
+    library.assign([4, 2], "wave")  # members in another order than by their ids
+    library.export(tmp_path / "one")
+    with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy") as copy:
+        copy.export(tmp_path / "two")
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
 def test_a_library_answers_alike_in_both_places_and_keeps_its_caches_to_its_user(
     eventful, address, tmp_path, monkeypatch
 ):
