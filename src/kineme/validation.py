@@ -175,6 +175,11 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
     )
 
 
+def stays(starts: Array, extents: Array) -> NDArray[np.bool_]:
+    """Tell which movements stay at their starts (n, d), to rounding; extents (n, d)."""
+    return np.asarray((extents <= 8 * np.finfo(float).eps * np.abs(starts)).all(axis=1))
+
+
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
     """Movements so small that the squares of their positions underflow, with their extents."""
     suspects = np.arange(len(offsets) - 1)

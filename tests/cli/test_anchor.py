@@ -97,6 +97,18 @@ def test_what_remains_is_listed_by_the_numbers_that_the_next_call_takes(folder, 
     ]
 
 
+def test_numbers_of_a_list_are_refused_once_the_library_has_changed(folder, tmp_path):
+    options = "-l", folder, "--method", "spectral", "--pictures", tmp_path / "p"
+    first = answer("anchor", *options)
+    assert run("anchor", *options).stdout.endswith(f"the same command with --accept all --at {first['version']}\n")
+    done = run("anchor", *options, "--accept", "1", "--at", first["version"])
+    assert done.stdout.splitlines()[-2].endswith(f"the same command with --accept all --at {first['version'] + 1}")
+    refused = run("anchor", *options, "--accept", "1,2", "--at", first["version"])
+    assert "expected the library at version 1, as it was listed, it is at version 2 by now" in refused.stderr
+    left = answer("anchor", *options, "--reject", "all", "--at", first["version"] + 1)
+    assert [len(left["rejected"]), left["version"]] == [3, len(answer("library", "history", "-l", folder))]
+
+
 def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
     demos = kineme.load_lasa(["CShape", "Angle"])
     with kineme.ActionLibrary(folder) as library:
@@ -125,6 +137,7 @@ def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
         (["--accept", "all", "--names", "old.json"], 1, "proposals are counted from 1, got 0"),
         (["--accept", "1", "--names", "more.json"], 2, "there are 4 proposals, counted from 1, got 9"),
         (["--accept", "1", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
+        (["--at", "1"], 2, "expected --at with --accept or --reject, got neither"),
         (["--clusters", "3", "--method", "hdbscan"], 1, "expected no n_clusters with method='hdbscan'"),
     ],
 )

@@ -256,6 +256,28 @@ def test_an_id_given_as_a_label_is_the_symbol_of_that_id(library):
     assert len(library[wave.id]) == len(library["wave"]) == len(wave) + 1
 
 
+@pytest.mark.parametrize("place", ["folder", "server"], indirect=True)
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda it, key: it.assign([1], key),
+        lambda it, key: it.merge(["bow"], key),
+        lambda it, key: it.learn(draw_movements(1, seed=1), labels=[key]),
+    ],
+)
+def test_the_id_of_a_symbol_that_is_no_more_names_no_new_one(place, change):
+    with ActionLibrary(place, create=True) as library:
+        library.learn(draw_movements(6, labels=["wave", "nod", "bow"] * 2))
+        key = library["wave"].id
+        library.merge(["wave", "nod"], "both")
+        before = contents(library)
+        with pytest.raises(
+            SpecificationError, match=f"got '{key}', which is the id .*, from which came 'both'; choose"
+        ):
+            change(library, key)
+        assert contents(library) == before
+
+
 def test_how_a_movement_came_to_its_symbol_is_kept_when_symbols_merge(library):
     library.assign([1], "nod", how="recognized")
     library.merge(["nod"], "bow")

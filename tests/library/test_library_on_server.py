@@ -32,6 +32,7 @@ from kineme.library.storage.postgres import ServerConnection, translated
 from kineme.library.storage.rows import insert
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.store import repeated
+from kineme.library.storage.symbols import make
 from kineme.studio.page.write_page import write_page
 from kineme.studio.server.app import create_app
 from soaking import slow
@@ -88,6 +89,14 @@ def test_a_library_moves_to_a_server_and_back_with_every_row(eventful, address, 
         assert tables(tmp_path / "back") == tables(eventful / "actions")
     with pytest.raises(DataError, match=r"expected a new library, but postgresql://.* is there already"):
         ActionLibrary.import_(eventful / "one.kineme", address)
+
+
+def test_an_export_of_a_server_is_the_same_file_as_that_of_its_import(library, tmp_path):
+    library.assign([4, 2], "wave")  # members in another order than by their ids
+    library.export(tmp_path / "one")
+    with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy") as copy:
+        copy.export(tmp_path / "two")
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_a_library_answers_alike_in_both_places_and_keeps_its_caches_to_its_user(
@@ -258,6 +267,11 @@ def test_writers_of_the_same_new_symbol_learn_beside_each_other(address):
     with ActionLibrary(address) as library:
         assert len(library["new"]) == 9
         assert library.verify() == []
+
+
+def test_a_name_that_another_writer_gave_meanwhile_is_a_conflict_which_is_tried_again(library):
+    with pytest.raises(ConflictError, match=r"got in the way of another process"), library.store.writing("x") as change:
+        make(change, "wave")  # as if it had not been there when it was looked for
 
 
 def test_movements_of_other_dimensions_are_refused_also_if_they_come_at_the_same_time(place, monkeypatch):

@@ -408,9 +408,12 @@ def test_recordings_are_read_but_not_learned_for_reading_only(folder, open_studi
 
 
 def test_spans_outside_of_the_recording_are_refused(client):
-    key = _send(client, _table(0)[0]).json()["recording"]
+    data, spans = _table(0)
+    key = _send(client, data).json()["recording"]
+    good = {"begin": spans[0][0], "end": spans[0][1], "label": "x"}
     for span in ({"begin": 90, "end": 99}, {"begin": 1.0, "end": 0.5}, {"begin": 0, "end": 1e-6}):
-        answer = client.post(f"/api/recordings/{key}/learn", json={"spans": [{**span, "label": "x"}]})
-        assert answer.status_code == 400, answer.text
+        for others in ([], [good]):
+            answer = client.post(f"/api/recordings/{key}/learn", json={"spans": [*others, {**span, "label": "x"}]})
+            assert answer.status_code == 400, answer.text
     with ActionLibrary(client.app.state.studio.library.folder, read_only=True) as library:
         assert "x" not in library

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.options import FOLDER, Parsed, json_option, library_option, opened, whole
+from kineme.cli.options import FOLDER, ID, Parsed, json_option, library_option, opened, whole
 from kineme.cli.output import ask, confirm, say, table, write
 from kineme.errors import DataError, KinemeError
 from kineme.reporting.text import counted, printable
@@ -54,6 +54,8 @@ _CHOICE = Parsed("1,2,...|all", _choice)
               help="First add movements to the symbols that they are recognized as.")  # fmt: skip
 @click.option("--accept", type=_CHOICE, help="Accept these proposals without asking.")
 @click.option("--reject", type=_CHOICE, help="Reject these proposals, and do not propose their movements again.")
+@click.option("--at", "expected", type=ID,
+              help="Only if the library is still at this version, as the list says it.")  # fmt: skip
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: proposed, or cluster 1]')  # fmt: skip
 @click.option("--pictures", type=FOLDER, default="proposals", show_default=True,
@@ -64,7 +66,8 @@ def anchor(folder: Any, **options: Any) -> None:
 
     On a terminal it asks about each proposal. With --accept or --reject it does not ask, and lists the proposals that
     remain: they have new numbers then. Otherwise it changes nothing and lists the proposals by the numbers that
-    --accept takes.
+    --accept takes. Where others change the library meanwhile, the numbers may mean others: with --at and the version of
+    the list, they are refused then.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
@@ -73,11 +76,20 @@ def anchor(folder: Any, **options: Any) -> None:
     from kineme.library.proposals import assign_recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
+    expected = options["expected"]
+    if expected is not None and not scripted:
+        raise click.UsageError("expected --at with --accept or --reject, got neither")
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
     names = _names(options["names"])
     writes = scripted or interactive
     with opened(folder, read_only=not writes) as library:
+        version = library.version  # before proposals are made of it
         joining, proposals = _proposed(library, options)
+        if expected is not None and expected != library.version:
+            raise DataError(
+                f"expected the library at version {expected}, as it was listed, it is at version {library.version} by "
+                "now; nothing was changed: list the proposals again"
+            )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
         if both := set(accepted) & set(rejected):
@@ -107,7 +119,9 @@ def anchor(folder: Any, **options: Any) -> None:
             library.reject(proposals[number - 1])
         data["rejected"] = rejected
         shown = data
+        version = library.version if scripted else version
         joining, remaining = _proposed(library, options) if scripted else (joining, proposals)
+        data["version"] = version
         if scripted and len(remaining.ids):
             data["remaining"] = _as_data(remaining)["proposals"]
             data["pictures"] = [str(path) for path in _draw(library, remaining, options["pictures"])]
@@ -227,6 +241,8 @@ def _text(data: dict[str, Any], alone: str) -> str:
     lines.append(table(heads[:n_columns], [row[:n_columns] for row in rows], title) if rows else title)
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")
+    if rows and "version" in data and (data.get("remaining") or not (data["accepted"] or data["rejected"])):
+        lines.append(f"accept what is listed here: the same command with --accept all --at {data['version']}")
     lines += [f"{printable(name)}: {counted(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
     if data.get("rejected"):
         lines.append(f"rejected {', '.join(map(str, data['rejected']))}")

@@ -104,7 +104,7 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
     assert len(pieces) == 1
     assert [problem.line for problem in pieces.problems] == [3, 4]
-    assert "lasts from 1000 to 1004.99 s" in str(pieces.problems[0])
+    assert "between 1006.00 and 1007.00 s in long.csv; it lasts from 1000.00 to 1004.99 s" in str(pieces.problems[0])
     (tmp_path / "l.csv").write_text("start,end,label\n1004,1005.05,wave\n1003.5,1006,nod\n999,1001,nod\n")
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
     assert [source.label for source in pieces.sources] == ["wave"]
@@ -112,6 +112,17 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     (tmp_path / "l.csv").write_text("start,end,label\n2000,2001,wave\n")
     with pytest.raises(DataError, match="found none; the first that is none"):
         labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+
+
+def test_a_stretch_at_rest_is_a_problem_beside_those_that_are_learned(tmp_path):
+    t = 1.7e9 + np.arange(0.0, 10.0, 0.01)
+    x = np.sin(np.minimum(t, 1.7e9 + 5))
+    pandas.DataFrame({"time": t, "x": x}).to_csv(tmp_path / "r.csv", index=False)
+    rows = "1700000001,1700000003,wave\n1700000006,1700000007,pause\n"
+    (tmp_path / "l.csv").write_text("start,end,label\n" + rows)
+    pieces = labeled_pieces(read_recordings(tmp_path / "r.csv"), read_labels(tmp_path / "l.csv"))
+    said = "expected a movement between 1700000006.00 and 1700000007.00 s in r.csv, got 101 samples at the same place"
+    assert ([*pieces.labels], [problem.what for problem in pieces.problems]) == (["wave"], [f"line 3: {said}"])
 
 
 def test_a_mark_without_length_is_a_problem_beside_labels_that_are_read(tmp_path, recordings):

@@ -24,7 +24,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.sampling import evenly_spaced
-from kineme.validation import Array, check_count, check_number, describe
+from kineme.validation import Array, check_count, check_number, describe, stays
 
 S = TypeVar("S", bound=Specification)
 
@@ -74,7 +74,7 @@ def encode(dmp: Specification, movements: MovementsLike) -> dict[str, Any]:
 
 def check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None:
     """Refuse a movement that does not move."""
-    still = (extents <= 8 * np.finfo(float).eps * np.abs(starts)).all(axis=1)
+    still = stays(starts, extents)
     if still.any():
         i = int(np.argmax(still))
         raise TrajectoryError(

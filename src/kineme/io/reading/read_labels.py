@@ -23,7 +23,7 @@ from kineme.io.records import NO_SYMBOLS, UNKNOWN, Problem
 from kineme.movements.tables.time_stamps import TIME_UNITS
 from kineme.reporting.text import counted, text_in
 from kineme.units import UNITS, converted, split_head, unit_named
-from kineme.validation import MIN_SAMPLES, Array
+from kineme.validation import MIN_SAMPLES, Array, stays
 
 #: Share of a stretch that may lie outside its recording: somebody who labels to the end rounds it up.
 _OUTSIDE = 0.1
@@ -254,7 +254,7 @@ def stretches_of(
 
     A stretch begins and ends at the samples nearest to its times. Those by the recording's clock that all lie outside
     of it, and would fit counted from its first sample, are taken so. A stretch outside of its recording, of fewer than
-    four samples, or labeled twice is a problem, and so are rows of recordings that are not there.
+    four samples, at the same place, or labeled twice is a problem, and so are rows of recordings that are not there.
     """
     demos, rows = recordings.demonstrations, table.rows
     if len(demos) > 1 and not any(row.recording or row.place for row in rows):
@@ -288,11 +288,19 @@ def stretches_of(
         for row in own:
             origin = float(times[0]) if since else 0.0
             start, stop = _samples(row, times, origin)
+            path = demos.positions[first + start : first + stop]
             outside = max(times[0] - origin - row.start, 0.0) + max(row.end + origin - times[-1], 0.0)
             if stop - start < MIN_SAMPLES or outside > _OUTSIDE * (row.end - row.start):
                 reason = (
-                    f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:g} and "
-                    f"{row.end:g} s in {source.path}; it lasts from {times[0] - origin:g} to {times[-1] - origin:g} s"
+                    f"expected at least {MIN_SAMPLES} samples, and nine tenths, of the time between {row.start:.2f} "
+                    f"and {row.end:.2f} s in {source.path}; it lasts from {times[0] - origin:.2f} to "
+                    f"{times[-1] - origin:.2f} s"
+                )
+                problems.append(Problem(table.name, row.line, reason))
+            elif stays(path[:1], np.ptp(path, axis=0, keepdims=True)).all():
+                reason = (
+                    f"expected a movement between {row.start:.2f} and {row.end:.2f} s in {source.path}, got "
+                    f"{stop - start} samples at the same place"
                 )
                 problems.append(Problem(table.name, row.line, reason))
             elif (line := lines.setdefault((start, stop), row.line)) != row.line:

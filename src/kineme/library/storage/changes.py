@@ -11,7 +11,7 @@ from kineme.library.storage.read import as_ids
 from kineme.library.storage.rows import Database, Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, CONTINUES, MAX_DOCUMENT
 from kineme.library.storage.store import NOW, Change, Store, repeated
-from kineme.library.storage.symbols import HOW, add_members, check_symbol, make, state_of
+from kineme.library.storage.symbols import HOW, add_members, check_no_id, check_symbol, make, state_of
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
@@ -241,5 +241,4 @@ def _check_description(text: Any) -> None:
 def _check_free(connection: Database, name: str) -> None:
     if select(connection, "symbol_state", "removed IS NULL AND name = :name", {"name": name}):
         raise SpecificationError(f"expected a name that no symbol has, got {name!r}; merge the two, or choose another")
-    if select(connection, "symbol", "id = :name", {"name": name}):
-        raise SpecificationError(f"expected a name, got {name!r}, which is the id of a symbol for good; choose another")
+    check_no_id(connection, name)

@@ -51,6 +51,7 @@ _WORDS = {
     "55P03": _BUSY,
     "40": _CONFLICT,
     "23505": _CONFLICT,
+    "23P01": _CONFLICT,  # of `symbol_name`, which is no unique index here
     "08": _CUT,
     "57P": _CUT,
     "25P03": _CUT,  # a transaction without a word for too long

@@ -11,12 +11,13 @@ from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 from stat import S_ISDIR, S_IWGRP, S_IWOTH
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from kineme.errors import DataError
 from kineme.library.storage import safety
 from kineme.library.storage.address import Address
-from kineme.library.storage.connection import define, schema_seal, statements
+from kineme.library.storage.connection import FILE, connect, define, schema_seal, statements
 from kineme.library.storage.postgres import ServerConnection, column_types, definitions
 from kineme.library.storage.rows import Database, Row, has_table, insert, select
 from kineme.library.storage.schema import COLUMNS, LATER_META, MIGRATIONS, SCHEMA_VERSION
@@ -120,21 +121,29 @@ class PostgresStore(Store):
 
     @contextmanager
     def database(self, copy: Path) -> Iterator[sqlite3.Connection]:
-        """Context manager: the library as a database of SQLite without a name; of its rows, "schema" alone differs."""
-        with closing(sqlite3.connect("", isolation_level=None)) as database:
-            define(database, {})
-            seals = {"schema": database.execute("SELECT * FROM meta").fetchone()}
-            database.execute("DELETE FROM meta")
-            database.execute("BEGIN")
-            with self.snapshot() as connection:
-                for table, rows in _all_rows(connection, connection.scan):
-                    ordered = sorted(rows, key=lambda row: _META.index(row[0])) if table == "meta" else rows
-                    marks = ", ".join("?" * (len(COLUMNS[table]) + 1))
-                    database.executemany(
-                        f"INSERT INTO {table} VALUES ({marks})", [seals.get(row[0], row) for row in ordered]
-                    )
-            database.execute("COMMIT")
-            yield database
+        """Context manager: the library as a database of SQLite, opened as files are; its row "schema" alone differs.
+
+        It is a file, opened again to read only: else VACUUM writes the entries of indexes in another order.
+        """
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / FILE
+            with closing(sqlite3.connect(file, isolation_level=None)) as database:
+                define(database, {})
+                database.execute("PRAGMA journal_mode = OFF")  # nobody else sees it
+                database.execute("PRAGMA synchronous = OFF")
+                seals = {"schema": database.execute("SELECT * FROM meta").fetchone()}
+                database.execute("DELETE FROM meta")
+                database.execute("BEGIN")
+                with self.snapshot() as connection:
+                    for table, rows in _all_rows(connection, connection.scan):
+                        ordered = sorted(rows, key=lambda row: _META.index(row[0])) if table == "meta" else rows
+                        marks = ", ".join("?" * (len(COLUMNS[table]) + 1))
+                        database.executemany(
+                            f"INSERT INTO {table} VALUES ({marks})", [seals.get(row[0], row) for row in ordered]
+                        )
+                database.execute("COMMIT")
+            with closing(connect(file, "ro", self.wait)) as written:
+                yield written
 
 
 def _all_rows(connection: Database, scan: Callable[[str], Iterable[Row]]) -> Iterator[tuple[str, list[Row]]]:

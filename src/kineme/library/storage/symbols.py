@@ -184,8 +184,20 @@ def stored_keys(connection: sql.Database, names: Iterable[str]) -> dict[str, int
     return keys
 
 
+def check_no_id(connection: sql.Database, name: str) -> None:
+    """Refuse a name that is the id of a symbol, also of one that is no more: ids mean the same for good."""
+    if sql.select(connection, "symbol", "id = :name", {"name": name}):
+        query = "SELECT name FROM symbol_state WHERE removed IS NULL AND parents LIKE :id ORDER BY name"
+        names = [repr(into) for (into,) in connection.execute(query, {"id": f'%"{name}"%'})]
+        after = f", from which came {', '.join(names)}" if names else ""
+        raise SpecificationError(
+            f"expected a name, got {name!r}, which is the id of a symbol for good{after}; choose another"
+        )
+
+
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
     """Create a symbol; return its key."""
+    check_no_id(change.connection, name)
     key = change.next_key("symbol")
     change.insert("symbol", [(key, f"sym-{secrets.token_hex(6)}", change.version)])
     state = change.next_key("symbol_state")

@@ -327,6 +327,8 @@ def learn(studio: Writes, key: records.RecordingKey, body: LearnRequest) -> dict
     else:
         rows = (LabelRow(span.begin, span.end, span.label, "", "", k + 1) for k, span in enumerate(body.spans))
         pieces = labeled_pieces(_one(studio, key, body), LabelTable("of the spans", tuple(rows), True))
+        if lost := [problem for problem in pieces.problems if problem.file == "of the spans"]:
+            raise DataError(str(lost[0]))  # beside what would be learned, nobody would see it
     columns = _columns_of(_read(studio, key), body.channels) if body.channels else None
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
