@@ -268,8 +268,10 @@ class Learned:
 
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
     """The primitive of a recording, whatever it holds, without its glitches; with orientations it is one of poses."""
-    dmp = replace(dmp, preprocessing=(RemoveGlitches(), *dmp.preprocessing))
-    return Learned((PoseDMP(dmp) if has_orientation(demonstration) else dmp).learn([demonstration]), demonstration)
+    clean = replace(dmp, preprocessing=(RemoveGlitches(), *dmp.preprocessing))
+    if has_orientation(demonstration):
+        return Learned(PoseDMP(clean).learn([demonstration]), demonstration)
+    return Learned(replace(clean.learn([demonstration]), dmp=dmp), demonstration)
 
 
 def has_orientation(demonstration: Trajectory) -> bool:
