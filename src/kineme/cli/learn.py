@@ -101,7 +101,10 @@ def learn(recordings: tuple[Path, ...], folder: Any, **options: Any) -> None:
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
             "notes": [
-                *dict.fromkeys((*parsed.notes, *heard, *notes_on_heads(parsed), *notes_on_samples(parsed))),
+                *parsed.notes,
+                *heard,
+                *notes_on_heads(parsed),
+                *notes_on_samples(parsed),
                 *_notes_on_order(library, parsed),
             ],
         }

@@ -67,6 +67,20 @@ def test_every_table_says_when_and_what(tmp_path, name):
     assert table.since_start is since_start
 
 
+def test_notes_are_those_of_the_pieces(tmp_path):
+    """Of two samples that a tracker lost, the labeled stretches hold none, or one."""
+    t = np.arange(0.0, 5.0, 0.01)
+    x = np.sin(3.0 * t) + 50.0
+    x[[150, 450]] = 0.0
+    pandas.DataFrame({"time": t, "x": x, "y": np.cos(t)}).to_csv(tmp_path / "lost.csv", index=False)
+    whole = read_recordings(tmp_path / "lost.csv")
+    (tmp_path / "l.csv").write_text("start,end,label\n0.5,1.75,wave\n2,4,nod\n")
+    (tmp_path / "m.csv").write_text("start,end,label\n2,4,nod\n")
+    lost = "1 movement with samples far from the path, the first "
+    notes = [each.notes for each in (whole, *(labeled_pieces(whole, read_labels(tmp_path / f"{k}.csv")) for k in "lm"))]
+    assert [[note.startswith(lost) for note in each] for each in notes] == [[True], [True], []]
+
+
 @pytest.mark.parametrize("name", ["out.csv", "out.json", "out.eaf", "out.txt"])
 def test_what_was_written_is_read_again_and_cuts_the_same_stretches(tmp_path, recordings, name):
     written = [

@@ -161,7 +161,7 @@ def on_rotations(heads, turned):
     table = np.hstack((U + 1, 0.1 * U, 0.2 * U**2, 0.3 * U, turned))
     rows = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist())
     recordings = read_recordings_from_bytes(f"time,{','.join(heads)}\n{rows}".encode(), "a.csv", Layout())
-    return [note for note in notes_on_samples(recordings) if "rotation vector" in note]
+    return [note for note in (*recordings.notes, *notes_on_samples(recordings)) if "rotation vector" in note]
 
 
 @pytest.mark.parametrize(

@@ -268,6 +268,7 @@ class Learned:
 
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
     """The primitive of a recording, whatever it holds, without its glitches; with orientations it is one of poses."""
+    # Not in its specification, by which others learn again: what it was learned of is clean.
     clean = replace(dmp, preprocessing=(RemoveGlitches(), *dmp.preprocessing))
     if has_orientation(demonstration):
         return Learned(PoseDMP(clean).learn([demonstration]), demonstration)

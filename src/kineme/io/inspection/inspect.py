@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.io.reading.column_order import notes_on_aside, notes_on_order
 from kineme.io.reading.formats import entries_of, format_at
-from kineme.io.reading.merge_files import Recordings, notes_on_gaps, notes_on_values, sampling_of
+from kineme.io.reading.merge_files import Recordings, notes_on_gaps, sampling_of
 from kineme.io.records import Contents, Problem
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.column_match import columns_recorded
@@ -164,7 +164,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str
     unlabeled = sum(summary.movements for summary in labels if summary.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    return [*dict.fromkeys(notes + notes_on_samples(recordings) + _notes_on_channels(demos))]
+    return notes + notes_on_samples(recordings) + _notes_on_channels(demos)
 
 
 def notes_on_heads(recordings: Recordings) -> list[str]:
@@ -174,9 +174,9 @@ def notes_on_heads(recordings: Recordings) -> list[str]:
 
 
 def notes_on_samples(recordings: Recordings) -> list[str]:
-    """Say what a person should know of the samples before they rely on what is learned of them."""
+    """Say what a person should know of the samples, beside the notes that they have, before they rely on them."""
     demos = recordings.demonstrations
-    notes = notes_on_gaps(recordings) + notes_on_values(recordings) + notes_on_sizes(demos)
+    notes = notes_on_gaps(recordings) + notes_on_sizes(demos)
     return notes + _notes_on_points(demos) + _notes_on_extents(demos)
 
 

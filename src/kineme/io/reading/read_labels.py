@@ -340,8 +340,9 @@ def cut_stretches(recordings: Recordings, stretches: Sequence[Stretch]) -> Recor
         positions, movements.stamps[rows], offsets, sources, movements.channels, movements.dimensions
     )
     of_whole = {*notes_on_values(recordings)}
-    notes = tuple(note for note in recordings.notes if note not in of_whole)
-    return replace(recordings, demonstrations=cut, sources=tuple(sources), notes=notes)
+    others = [note for note in recordings.notes if note not in of_whole]
+    pieces = replace(recordings, demonstrations=cut, sources=tuple(sources))
+    return replace(pieces, notes=(*others, *notes_on_values(pieces)))
 
 
 def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
